@@ -441,6 +441,8 @@ class Algorithm(Config):
     """KL divergence that the adaptive schedule aims at."""
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
+    use_mixed_precision: bool = False
+    """Whether the networks are updated in bfloat16 where precision allows it."""
     # After 0.61 M samples, 64 % of the commands were followed with mirrored samples, and 23 % with
     # a mirror loss. They double the cost of an update.
     symmetry: bool | None = None

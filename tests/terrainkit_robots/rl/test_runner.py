@@ -263,6 +263,32 @@ def test_symmetry_setting_reaches_rsl_rl(make, task, symmetry):
     assert not is_augmented or runner.alg.symmetry.use_data_augmentation
 
 
+def test_samples_mirrored_once_update_as_those_of_each_mini_batch(make):
+    once, often = make(folder=None), make(folder=None)
+    often.alg.update = type(often.alg).update.__get__(often.alg)
+    for runner in (once, often):
+        torch.manual_seed(1)
+        runner.learn(2)
+    assert differences(once.state_dict(), often.state_dict()) == []
+    assert set(once.alg.storage.observations.keys()) == {"policy", "privileged"}
+
+
+def test_mixed_precision_changes_little_and_keeps_single_precision(make, task):
+    settings = (
+        Algorithm(schedule="fixed", use_mixed_precision=is_mixed) for is_mixed in (True, False)
+    )
+    mixed, single = (
+        make(replace(task, algorithm=algorithm), folder=None) for algorithm in settings
+    )
+    for runner in (mixed, single):
+        torch.manual_seed(1)
+        runner.learn(1)
+    weights, other = (runner.alg.actor.state_dict() for runner in (mixed, single))
+    assert {weight.dtype for weight in weights.values()} <= {torch.float32, torch.int64}
+    errors = [float((weight - other[name]).abs().max()) for name, weight in weights.items()]
+    assert 0 < max(errors) < 0.02  # 20 steps of Adam change a weight by about 0.02
+
+
 def test_runner_config_has_the_tasks_values():
     policy = Policy(actor_hidden_dims=(7,), critic_hidden_dims=(5, 6), activation="relu")
     algorithm = Algorithm(gamma=0.5, entropy_coef=0.125, num_mini_batches=2)
