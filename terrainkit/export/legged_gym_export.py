@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ExportError
 from terrainkit.export.requirements import require_one_friction, require_whole_solids
 from terrainkit.files.archive import write_arrays
+from terrainkit.geometry.walls import WallRule, wall_edges
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -48,7 +49,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     tops = top_heights(terrain_map)
     arrays = {
         "heights": heights_at_corners(tops).astype(np.float32),
-        "x_edges": x_edges(tops, config.wall_threshold),
+        "x_edges": x_edges(tops, terrain_map.wall_rule),
         "cell": np.float64(config.cell),
         "border": np.float64(config.border),
         "patch_size": np.array(config.patch_size),
@@ -88,16 +89,16 @@ def heights_at_corners(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum(along_x[:, :-1], along_x[:, 1:])
 
 
-def x_edges(heights: NDArray[np.float64], threshold: float) -> NDArray[np.bool_]:
+def x_edges(heights: NDArray[np.float64], rule: WallRule) -> NDArray[np.bool_]:
     """Return which corners are at a wall that faces along x.
 
     Args:
         heights: Height of each cell [m], shape (nx, ny).
-        threshold: Difference of height above which there is a wall [m].
+        rule: Which edges between neighboring cells are walls.
 
     Returns:
         Mask of the corners, shape (nx + 1, ny + 1).
     """
-    padded = np.pad(heights, 1, mode="edge")
-    wall = np.abs(np.diff(padded, axis=0)) > threshold
+    inside = np.pad(wall_edges(heights, rule)[0], ((1, 1), (0, 0)))
+    wall = np.pad(inside, ((0, 0), (1, 1)), mode="edge")
     return np.asarray(wall[:, :-1] | wall[:, 1:])

@@ -280,9 +280,10 @@ def _is_flat(terrain_map: "TerrainMap") -> bool:
     heights, grid = terrain_map.heights, terrain_map.grid
     for start in range(0, len(heights), ROWS_PER_BAND):
         band = heights[start : start + ROWS_PER_BAND + 1]  # the next one repeats the last row
-        nodes = NodeGrid.from_heights(
-            band, replace(grid, shape=band.shape), terrain_map.config.wall_threshold
-        )
+        rule = terrain_map.wall_rule
+        if isinstance(rule, np.ndarray):
+            rule = rule[start : start + ROWS_PER_BAND + 1]
+        nodes = NodeGrid.from_heights(band, replace(grid, shape=band.shape), rule)
         if not flat_cells(nodes).all():
             return False
     return True

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning, is_built_in, listing
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.geometry.solids import Solids, check_solids
+from terrainkit.geometry.walls import ALONG_X, ALONG_Y
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import PatchParameters, Values
@@ -95,6 +96,8 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
     }
+    if terrain_map.walls is not None:
+        arrays["walls"] = terrain_map.walls
     if terrain_map.import_reports:
         text = msgspec.json.encode(terrain_map.import_reports).decode()
         arrays["import_reports"] = np.array(text)
@@ -155,6 +158,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             parameters=_read_parameters(archive, config, terrain_types),
             solids=_read_solids(archive, size),
             goals=_read_poses(archive, "goals", size, MAX_GOALS),
+            walls=_read_walls(archive, grid.shape),
             import_reports=_read_import_reports(archive, config.rows * config.cols),
         )
 
@@ -232,6 +236,17 @@ def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
             f"{archive.path}: ground_friction: got values out of range; expected 0 to {MAX_VALUE}"
         )
     return np.broadcast_to(friction, shape)
+
+
+def _read_walls(archive: Archive, shape: tuple[int, int]) -> NDArray[np.uint8] | None:
+    """Return the walls of an imported map; None if the heights decide."""
+    if "walls" not in archive.names():
+        return None
+    walls = archive.array("walls", "u1", shape)
+    beyond = (walls[-1] & ALONG_X).any() or (walls[:, -1] & ALONG_Y).any()
+    if beyond or walls.max() > ALONG_X | ALONG_Y:
+        raise MapFileError(f"{archive.path}: walls: got an edge out of range; expected 0 to 3")
+    return walls
 
 
 def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:

@@ -23,6 +23,7 @@ from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.free_space import free_intervals
 from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.walls import WallRule
 from terrainkit.map.patch import Patch
 
 if TYPE_CHECKING:
@@ -134,7 +135,8 @@ def _content(patch: Patch) -> bytes:
         return b""
     points = np.concatenate([patch.origin[None], patch.goals[:, :3]]) - [*patch.grid.lower, 0.0]
     # Positions in the map are rounded to single precision.
-    arrays = patch.heights, patch.friction, np.round(points, 3), patch.far_edges
+    walls = np.zeros(0, np.uint8) if patch.walls is None else patch.walls
+    arrays = patch.heights, patch.friction, walls, np.round(points, 3), patch.far_edges
     return sha256(b"".join(array.tobytes() for array in arrays)).digest()
 
 
@@ -148,8 +150,9 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     """
     number = math.prod(patch.grid.shape) * columns_per_cell(patch) ** 2
     check_memory(number * _BYTES_PER_COLUMN, f"the footholds of a patch of {number} columns")
-    _check_goals(patch, threshold)
-    columns = sample_columns(patch, threshold)
+    rule = threshold if patch.walls is None else patch.walls
+    _check_goals(patch, rule)
+    columns = sample_columns(patch, rule)
     segments = _segments(patch, columns)
     graph = FootholdGraph.build(columns, limits, _outer_nodes(patch, columns, segments))
     path = _Path(graph, segments)
@@ -240,7 +243,7 @@ class _Path:
         self.points = position(np.array(nodes))
 
 
-def _check_goals(patch: Patch, threshold: float) -> None:
+def _check_goals(patch: Patch, rule: WallRule) -> None:
     """Raise ConfigError if a goal is outside of its patch, or inside the ground or a solid."""
     if not len(patch.goals):
         return
@@ -249,7 +252,7 @@ def _check_goals(patch: Patch, threshold: float) -> None:
     outside = (index < -0.5) | (index > np.array(patch.grid.shape) - 0.5)
     if not np.isfinite(goals[:, :3]).all() or outside.any():
         raise ConfigError(f"{patch.terrain}: got a goal outside of its patch; expected it inside")
-    ground = surface_at(patch.heights, index, threshold=threshold).height
+    ground = surface_at(patch.heights, index, rule=rule).height
     solids = SolidIndex(patch.solids.select(patch.solids.collides))
     floor, ceiling = np.moveaxis(free_intervals(ground, solids.intervals(goals[:, :2])), -1, 0)
     z = goals[:, 2:3]

@@ -10,6 +10,7 @@ from terrainkit.feasibility.solid_tops import Tops, solid_widths
 from terrainkit.geometry.free_space import free_intervals
 from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.walls import WallRule
 from terrainkit.map.patch import Patch
 
 MAX_SPACING = 0.035
@@ -101,12 +102,12 @@ def columns_per_cell(patch: Patch) -> int:
     return math.ceil(patch.grid.cell / MAX_SPACING - 1e-9)
 
 
-def sample_columns(patch: Patch, threshold: float) -> Columns:
+def sample_columns(patch: Patch, rule: WallRule) -> Columns:
     """Return the columns of a patch: its samples, or finer columns if it has solids.
 
     Args:
         patch: The patch. Solids that do not collide are ignored.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
     """
     grid = patch.grid
     solids = patch.solids.select(patch.solids.collides)
@@ -127,7 +128,7 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     index = index.reshape(-1, 2)
     in_cells = (index + 0.5) / n - 0.5
     xy: FloatArray = index * spacing + np.array(lower)
-    ground = surface_at(patch.heights, in_cells, threshold=threshold).height
+    ground = surface_at(patch.heights, in_cells, rule=rule).height
     # Each solid is at least as wide as the distance of two columns, so none fits between them.
     widened = np.maximum(spacing - solid_widths(solids), 0.0) / 2
     solid_index = SolidIndex(solids, radius=widened)

@@ -13,7 +13,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
 from terrainkit.geometry.rectangle_decomposition import Span, decompose_rectangles
-from terrainkit.geometry.walls import flat_corners
+from terrainkit.geometry.walls import WallRule, flat_corners
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
@@ -56,7 +56,7 @@ class BoxDecomposition:
 def decompose_boxes(
     heights: NDArray[np.float32],
     grid: Grid,
-    threshold: float,
+    rule: WallRule,
     patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
     friction: ArrayLike = 1.0,
 ) -> BoxDecomposition:
@@ -73,7 +73,7 @@ def decompose_boxes(
     Args:
         heights: Samples [m], shape `grid.shape`.
         grid: Positions of the samples.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
         friction: Friction of each cell, broadcast to `grid.shape`. Each box has one friction.
     """
@@ -82,7 +82,7 @@ def decompose_boxes(
     check_memory(heights.size * _BYTES_PER_CELL, f"boxes of {heights.size} samples")
     friction = np.broadcast_to(np.asarray(friction, dtype=np.float32), heights.shape)
 
-    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    node_grid = NodeGrid.from_heights(heights, grid, rule)
     flat = flat_cells(node_grid)
     # A lower bound of the ground in each cell.
     # The surface of a cell depends on the 3 x 3 samples around it, and is nowhere below their

@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.geometry.solid_raster import SolidRaster
-from terrainkit.geometry.walls import center_heights, wall_edges
+from terrainkit.geometry.walls import (
+    ALONG_X,
+    ALONG_Y,
+    WallRule,
+    center_heights,
+    wall_edges,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +42,7 @@ class SurfacePoints:
 
 
 def surface_at(
-    heights: NDArray[np.float32], points: NDArray[np.float64], *, threshold: float
+    heights: NDArray[np.float32], points: NDArray[np.float64], *, rule: WallRule
 ) -> SurfacePoints:
     """Evaluate the surface at `points`.
 
@@ -48,7 +54,7 @@ def surface_at(
     Args:
         heights: Samples [m], shape (nx, ny).
         points: Finite points in units of samples, shape (n, 2); (0, 0) is at `heights[0, 0]`.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
     """
     limit = np.array(heights.shape) - 1
     beyond = (points < 0) | (points > limit)
@@ -57,8 +63,12 @@ def surface_at(
     i, j = low.T
     i1, j1 = np.minimum(low + 1, limit).T
     samples = np.stack([heights[i, j], heights[i1, j], heights[i1, j1], heights[i, j1]], axis=1)
-    # Compare as float32, as everywhere, so that all views agree on which edges are walls.
-    walls = np.abs(np.roll(samples, -1, axis=1) - samples) > threshold
+    if isinstance(rule, np.ndarray):
+        x, y = rule & ALONG_X, rule & ALONG_Y
+        walls = np.stack([x[i, j], y[i1, j], x[i, j1], y[i, j]], axis=1) > 0
+    else:
+        # Compare as float32, as everywhere, so that all views agree on which edges are walls.
+        walls = np.abs(np.roll(samples, -1, axis=1) - samples) > rule
     corners = samples.astype(np.float64)
     u, v = (points - low).T
     height, gradient = _two_triangles(corners, u, v)
@@ -129,14 +139,14 @@ class WallTable:
     of each quad [m], shape (k, 4, 4). Quarter 2 p + q is at corner (p, q)."""
 
     @classmethod
-    def from_heights(cls, heights: NDArray[np.float32], threshold: float) -> Self:
+    def from_heights(cls, heights: NDArray[np.float32], rule: WallRule) -> Self:
         """Return the table of a map.
 
         Args:
             heights: Samples [m], shape (nx, ny).
-            threshold: Difference between neighboring samples above which there is a wall [m].
+            rule: Which edges between neighboring samples are walls.
         """
-        x, y = wall_edges(heights, threshold)
+        x, y = wall_edges(heights, rule)
         i, j = np.nonzero(x[:, :-1] | x[:, 1:] | y[:-1] | y[1:])
         corner = np.stack(
             [heights[i, j], heights[i + 1, j], heights[i + 1, j + 1], heights[i, j + 1]]

@@ -12,7 +12,8 @@ from the corner with the smallest x and y. Edge k runs from corner k to corner k
     |   0 --0-- 1
     +-----------> x
 
-An edge whose ends differ by more than a threshold is a wall: the ground is flat from either end to
+An edge whose ends differ by more than a threshold is a wall, or an edge that an imported map marks
+as one: the ground is flat from either end to
 the midpoint of the edge, and vertical there. A quad with a wall is split along its midlines. The
 edges that are not walls determine which corners share a height at its center.
 """
@@ -24,28 +25,70 @@ from numpy.typing import NDArray
 
 _ROWS = 32
 
+ALONG_X, ALONG_Y = np.uint8(1), np.uint8(2)
+"""Bits of a sample (i, j) whose edge to (i + 1, j) or to (i, j + 1) is a wall."""
+
+WallRule = float | NDArray[np.uint8]
+"""Largest difference between neighboring samples that is not a wall [m]; infinite for no walls. Or
+the bits of the walls of each sample, shape (nx, ny), where the difference does not decide."""
+
 
 def wall_edges(
-    heights: NDArray[np.float32], threshold: float
+    heights: NDArray[np.floating], rule: WallRule
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which edges are walls.
 
     Args:
         heights: Samples [m], shape (nx, ny).
-        threshold: Largest difference that is not a wall [m]; infinite for no walls.
+        rule: Which edges are walls.
 
     Returns:
         Masks of the edges along x, shape (nx - 1, ny), and along y, shape (nx, ny - 1).
     """
+    if isinstance(rule, np.ndarray):
+        return (rule[:-1] & ALONG_X) > 0, (rule[:, :-1] & ALONG_Y) > 0
     nx, ny = heights.shape
     x = np.empty((nx - 1, ny), dtype=bool)
     y = np.empty((nx, ny - 1), dtype=bool)
     # In blocks of rows, so that the differences stay in the cache and no large array is allocated.
     for i in range(0, nx, _ROWS):
         rows = heights[i : i + _ROWS + 1]
-        np.greater(np.abs(np.diff(rows, axis=0)), threshold, out=x[i : i + _ROWS])
-        np.greater(np.abs(np.diff(rows[:_ROWS], axis=1)), threshold, out=y[i : i + _ROWS])
+        np.greater(np.abs(np.diff(rows, axis=0)), rule, out=x[i : i + _ROWS])
+        np.greater(np.abs(np.diff(rows[:_ROWS], axis=1)), rule, out=y[i : i + _ROWS])
     return x, y
+
+
+def padded_rule(rule: WallRule) -> WallRule:
+    """Return the rule of samples that are repeated once around a map."""
+    if not isinstance(rule, np.ndarray):
+        return rule
+    padded = np.pad(rule, 1, mode="edge")
+    padded[[0, -2, -1]] &= ALONG_Y
+    padded[:, [0, -2, -1]] &= ALONG_X
+    return padded
+
+
+def steps_of_one_cell(heights: NDArray[np.float32], threshold: float) -> NDArray[np.uint8]:
+    """Return the bits of the walls of a file, which is not known between its samples.
+
+    A difference above the threshold is a wall unless the ground slopes on: a neighboring edge in
+    line exceeds the threshold as well, and is at least a third as high.
+
+    Args:
+        heights: Samples [m], shape (nx, ny).
+        threshold: Difference from which an edge may be a wall [m].
+
+    Returns:
+        Bits of each sample, shape (nx, ny).
+    """
+    bits = np.zeros(heights.shape, np.uint8)
+    for values, bit, target in ((heights, ALONG_X, bits), (heights.T, ALONG_Y, bits.T)):
+        step = np.abs(np.diff(values, axis=0))
+        neighbors = np.pad(step, ((1, 1), (0, 0)))
+        beside = np.maximum(neighbors[:-2], neighbors[2:])
+        slopes_on = (beside > threshold) & (3 * beside >= step)
+        target[:-1] |= bit * ((step > threshold) & ~slopes_on)
+    return bits
 
 
 def flat_corners(edges: NDArray[np.uint8]) -> NDArray[np.bool_]:

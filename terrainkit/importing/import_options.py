@@ -122,7 +122,8 @@ class ImportOptions(ReadOptions):
     """Width of the ground around the patches [m]; heights are from the file, beyond it its edge."""
 
     slope_threshold: Size | None = 0.75
-    """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""
+    """Slope above which a step between two samples becomes a vertical wall, unless the slope goes
+    on beside it; none: no walls."""
 
     solids: bool = False
     """Keep overhangs of closed meshes as convex solids; otherwise the ground is their top."""

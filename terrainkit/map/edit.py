@@ -36,7 +36,8 @@ def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None
         new = checked_heights(heights, terrain_map.grid, "heights: got")
     solids = assign_solids(config, terrain_map.solids if solids is None else solids)
     goals = terrain_map.goals.copy()
-    raised = replace(terrain_map, heights=new)
+    walls = terrain_map.walls if heights is None else None  # they belong to the old heights
+    raised = replace(terrain_map, heights=new, walls=walls)
     xy = np.nan_to_num(goals[..., :2])
     goals[..., 2] += raised.height(xy) - terrain_map.height(xy)
     spawns = np.empty(terrain_map.difficulty.shape, dtype=object)
@@ -48,9 +49,8 @@ def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None
         positions = _spawn_positions(spawn_ground, f"patch ({row}, {col})", old, rng)
         spawns[row, col] = with_heading(positions, patch_goals)
     return replace(
-        terrain_map,
+        raised,
         config=config,
-        heights=new,
         solids=solids,
         goals=goals,
         spawns=pad_poses(spawns),

@@ -99,6 +99,8 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
         number = int((difference != 0).sum())
         total = f"{number:,} of {difference.size:,} samples"
         yield f"heights differ by up to {difference.max():.3g} m at {total}"
+    if not np.array_equal(np.asarray(a.walls), np.asarray(b.walls)):
+        yield "walls between samples differ"
     if not np.array_equal(a.friction, b.friction):
         number = int((a.friction != b.friction).sum())
         yield f"friction differs in {number:,} of {a.friction.size:,} cells"

@@ -104,6 +104,9 @@ class Patch:
     spawns: NDArray[np.float32]
     """Spawn positions x, y, z [m] and headings [rad], shape (k, 4); the origin comes first."""
 
+    walls: NDArray[np.uint8] | None = None
+    """Which edges of the samples are walls, as in `TerrainMap.walls`, shape `grid.shape`."""
+
     spawn_offset: float = 0.0
     """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]. It is
     known for a patch that has just been built; `TerrainMap.patch` returns 0."""
@@ -320,7 +323,7 @@ def _place_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArr
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
             raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
-        ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
+        ground = surface_at(geometry.heights, index, rule=config.wall_threshold).height
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
     return goals.astype(np.float32)
 

@@ -290,7 +290,7 @@ class SpawnGround:
         low, high = _height_range(heights, index, radius)
         if low == high:
             return low, high, high
-        surface = surface_at(heights, np.array([index]), threshold=threshold)
+        surface = surface_at(heights, np.array([index]), rule=threshold)
         z = float(surface.height[0])
         if radius <= 1:
             first = (max(0, math.floor(p - radius)) for p in index)

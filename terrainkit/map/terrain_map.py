@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from terrainkit.geometry.box_decomposition import BoxDecomposition
     from terrainkit.geometry.ground_surface import SurfacePoints
     from terrainkit.geometry.mesh import TriMesh
+    from terrainkit.geometry.walls import WallRule
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -74,6 +75,11 @@ class TerrainMap:
     goals: NDArray[np.float32]
     """Goals of each patch in their order: x, y, z [m] and heading [rad], shape (rows, cols, k, 4),
     NaN where a patch has fewer than k."""
+
+    walls: NDArray[np.uint8] | None = None
+    """Which edges between neighboring samples of an imported map are walls: bit 1 of a sample for
+    the edge along x to the next one, bit 2 along y, shape `grid.shape`. None where the difference
+    of the heights decides, by `slope_threshold`."""
 
     import_reports: tuple[ImportReport, ...] = ()
     """What an imported map lost of its file; of several files, one report for each patch, row by
@@ -190,14 +196,14 @@ class TerrainMap:
         from terrainkit.geometry.mesh import full_mesh, merged_mesh
 
         make_mesh = merged_mesh if merged else full_mesh
-        return make_mesh(self.heights, self.grid, self.config.wall_threshold)
+        return make_mesh(self.heights, self.grid, self.wall_rule)
 
     def boxes(self) -> "BoxDecomposition":
         """Return the level ground as boxes; see `terrainkit.geometry.box_decomposition`."""
         from terrainkit.geometry.box_decomposition import decompose_boxes
 
-        threshold, edges = self.config.wall_threshold, self.config.patch_edges
-        return decompose_boxes(self.heights, self.grid, threshold, edges, self.friction)
+        edges = self.config.patch_edges
+        return decompose_boxes(self.heights, self.grid, self.wall_rule, edges, self.friction)
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
         """Return the heights in the format of Isaac Gym's `add_heightfield`.
@@ -220,6 +226,11 @@ class TerrainMap:
 
         require_no_solids(self, "a heightfield")
         return np.ascontiguousarray(int16_heights(self.heights.T, vertical_scale))
+
+    @property
+    def wall_rule(self) -> "WallRule":
+        """Which edges between neighboring samples are walls; see `terrainkit.geometry.walls`."""
+        return self.config.wall_threshold if self.walls is None else self.walls
 
     @property
     def patch_names(self) -> NDArray[np.str_]:
@@ -246,6 +257,7 @@ class TerrainMap:
             parameters=self.parameters[row, col],
             grid=self.config.patch_grid(row, col),
             heights=self.heights[cells],
+            walls=None if self.walls is None else self.walls[cells],
             friction=self.friction[cells],
             solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
             goals=goals[~np.isnan(goals[:, 0])],
@@ -338,7 +350,7 @@ class TerrainMap:
         from terrainkit.geometry.ground_surface import surface_at
 
         index = (points - self.first_sample) / self.grid.cell
-        return surface_at(self.heights, index, threshold=self.config.wall_threshold)
+        return surface_at(self.heights, index, rule=self.wall_rule)
 
 
 def _points(name: str, values: ArrayLike, size: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:

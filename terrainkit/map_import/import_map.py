@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.walls import steps_of_one_cell, wall_edges
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.ground_friction import read_friction
 from terrainkit.importing.height_source import Source, fill_missing, open_source
@@ -131,6 +132,10 @@ def make_map(
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
+    walls = steps_of_one_cell(heights, config.wall_threshold)
+    edges = zip(wall_edges(heights, walls), wall_edges(heights, config.wall_threshold), strict=True)
+    if not all(np.array_equal(own, steep) for own, steep in edges):
+        terrain_map = replace(terrain_map, walls=walls)
     counts["num_missing"] = int(np.isnan(found).sum())
     report = make_report(terrain_map, source, origin, columns, **counts)
     return ImportedMap(terrain_map=replace(terrain_map, import_reports=(report,)), report=report)

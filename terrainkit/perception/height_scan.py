@@ -53,7 +53,7 @@ def exact_surface(terrain_map: TerrainMap) -> HeightfieldSurface:
         heights=heights,
         first_sample=terrain_map.first_sample,
         cell=terrain_map.grid.cell,
-        walls=WallTable.from_heights(heights, terrain_map.config.wall_threshold),
+        walls=WallTable.from_heights(heights, terrain_map.wall_rule),
         visible=SolidRaster(visible, exact=True) if len(visible) else None,
     )
 

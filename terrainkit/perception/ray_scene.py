@@ -65,8 +65,8 @@ class RayScene:
         level = heights.mean(dtype=np.float64) / grid.cell
         center = np.array([*(np.array(grid.shape) // 2), level])
         self._origin = np.array([*grid.lower, 0.0]) + center * grid.cell
-        cells, threshold = Grid(shape=grid.shape, cell=1.0), terrain_map.config.wall_threshold
-        ground = closed_mesh(merged_mesh(heights, cells, threshold), _DEPTH)
+        cells = Grid(shape=grid.shape, cell=1.0)
+        ground = closed_mesh(merged_mesh(heights, cells, terrain_map.wall_rule), _DEPTH)
         corners = ground.vertices.astype(np.float64)
         # Vertices are at samples and between them; where walls cross, the mesh parts their edges.
         corners[:, :2] = (2 * corners[:, :2]).round() / 2

@@ -8,20 +8,21 @@ from terrainkit.geometry.mesh.node_grid import QUADS_PER_BLOCK, NodeGrid
 from terrainkit.geometry.mesh.row_buffer import RowBuffer
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.mesh.wall_quads import wall_quads
+from terrainkit.geometry.walls import WallRule
 
 
-def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
+def full_mesh(heights: NDArray[np.float32], grid: Grid, rule: WallRule) -> TriMesh:
     """Return the surface at full resolution.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
         grid: Positions of the samples.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
 
     Raises:
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    node_grid = NodeGrid.from_heights(heights, grid, rule)
     num_vertices = node_grid.check_memory(node_grid.z.size, node_grid.has_wall)
     triangles, centers = quad_faces(node_grid, np.ones_like(node_grid.has_wall), num_vertices)
     used = np.ones(node_grid.vertex_count + len(centers), dtype=bool)

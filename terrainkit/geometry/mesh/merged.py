@@ -18,20 +18,21 @@ from terrainkit.geometry.mesh.polygons import Mask
 from terrainkit.geometry.mesh.rectangles import Rectangles
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.mesh.wall_runs import WallRuns
+from terrainkit.geometry.walls import WallRule
 
 
-def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
+def merged_mesh(heights: NDArray[np.float32], grid: Grid, rule: WallRule) -> TriMesh:
     """Return the surface with coplanar faces merged.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
         grid: Positions of the samples.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
 
     Raises:
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    node_grid = NodeGrid.from_heights(heights, grid, rule)
     triangles, extra = _faces(node_grid, *_merge_quads(node_grid))
     blocks = [
         triangles[start : start + QUADS_PER_BLOCK]

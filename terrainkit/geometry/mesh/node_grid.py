@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh.row_buffer import RowBuffer
-from terrainkit.geometry.walls import wall_edges
+from terrainkit.geometry.walls import WallRule, padded_rule, wall_edges
 
 _BYTES_PER_NODE = 11
 """Peak memory of the nodes and of the masks of what is merged, per node [bytes]; measured."""
@@ -49,20 +49,20 @@ class NodeGrid:
     """Whether the edge from (i, j) to (i, j + 1) is a wall, shape (nx, ny - 1)."""
 
     @classmethod
-    def from_heights(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "NodeGrid":
+    def from_heights(cls, heights: NDArray[np.float32], grid: Grid, rule: WallRule) -> "NodeGrid":
         """Return the nodes of a heightfield.
 
         Args:
             heights: Heights [m], shape `grid.shape`.
             grid: The grid.
-            threshold: Difference between neighboring samples above which there is a wall [m].
+            rule: Which edges between neighboring samples are walls.
 
         Raises:
             MemoryLimitError: if the mesh would not fit in memory.
         """
         check_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
-        walls_x, walls_y = wall_edges(z, threshold)
+        walls_x, walls_y = wall_edges(z, padded_rule(rule))
         x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))
         return cls(x=x, y=y, z=z, walls_x=walls_x, walls_y=walls_y)
 

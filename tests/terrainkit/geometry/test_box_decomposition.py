@@ -52,9 +52,9 @@ def patch(terrain, *, size=(6.0, 4.0), border=0.0, **parameters):
 def test_boxes_match_covered_cells(heights, threshold):
     cover = cover_of(heights, threshold, tuple(np.array([0, n // 2, n]) for n in heights.shape))
     on, off = (points_in_cells(cells) for cells in (cover.box_mask, ~cover.box_mask))
-    ground = surface_at(heights, on - 0.5, threshold=threshold).height
+    ground = surface_at(heights, on - 0.5, rule=threshold).height
     np.testing.assert_allclose(top_at(cover, on), ground, atol=1e-6)
-    ground = surface_at(heights, off - 0.5, threshold=threshold).height
+    ground = surface_at(heights, off - 0.5, rule=threshold).height
     assert (top_at(cover, off) <= ground + 1e-6).all()
     assert cover.box_mask.all() or threshold > 1  # else all steps are walls
 

@@ -13,7 +13,7 @@ def quad(*corners):
 
 
 def height_at(heights, place, threshold):
-    return surface_at(heights, np.array([place], dtype=float), threshold=threshold).height.item()
+    return surface_at(heights, np.array([place], dtype=float), rule=threshold).height.item()
 
 
 PLANES = quad(0, 0.5, 1, 1.5)
@@ -59,10 +59,10 @@ def test_surface_gradient_matches_finite_differences(threshold):
     rng = np.random.default_rng(0)
     heights = rng.integers(0, 4, size=(12, 9)).astype(np.float32)
     place = rng.uniform(0, [11, 8], size=(1000, 2))
-    gradient = surface_at(heights, place, threshold=threshold).gradient
+    gradient = surface_at(heights, place, rule=threshold).gradient
     for k, step in enumerate(np.eye(2) * 1e-7):
-        high = surface_at(heights, place + step, threshold=threshold).height
-        low = surface_at(heights, place - step, threshold=threshold).height
+        high = surface_at(heights, place + step, rule=threshold).height
+        low = surface_at(heights, place - step, rule=threshold).height
         np.testing.assert_allclose(gradient[:, k], (high - low) / 2e-7, atol=1e-5)
 
 
@@ -72,13 +72,13 @@ def test_surface_gradient_matches_finite_differences(threshold):
 )
 def test_surface_continues_level_beyond_the_samples(place, height, gradient):
     slope = quad(0, 2, 7, 5)  # 2 along x, 5 along y
-    found = surface_at(slope, np.array([place], dtype=float), threshold=np.inf)
+    found = surface_at(slope, np.array([place], dtype=float), rule=np.inf)
     assert found.height.tolist() == [height]
     assert found.gradient.tolist() == [list(gradient)]
 
 
 def test_surface_of_a_single_sample_is_level():
-    found = surface_at(np.full((1, 1), 3, np.float32), np.array([[0.3, -8.0]]), threshold=0.1)
+    found = surface_at(np.full((1, 1), 3, np.float32), np.array([[0.3, -8.0]]), rule=0.1)
     assert found.height.tolist() == [3.0]
     assert found.gradient.tolist() == [[0.0, 0.0]]
 

@@ -7,12 +7,13 @@ import pytest
 import trimesh
 
 import terrainkit as tk
-from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
+from terrainkit.errors import ConfigError, HeightFileError, MapFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
 from terrainkit.map_import.differences import _height_errors
+from terrainkit.perception import HeightScan, RayCaster
 from tests.meshes import box, save_bridge
 from tests.tables import read_table
 
@@ -423,3 +424,42 @@ def test_import_of_a_part_has_only_the_solids_in_it(tmp_path):
     assert sorted(lower[:, 0].round(3).tolist()) == pytest.approx([0.985, 1.0, 1.5], abs=0.1)
     assert sorted(upper[:, 0].round(3).tolist()) == pytest.approx([1.015, 4.0, 4.0], abs=1e-3)
     assert imported.report.num_thin_bodies == 2
+
+
+def ramp():
+    """Return 60 x 40 heights: a ramp of 45 degrees from x = 2 m to 4 m, which ends at a wall."""
+    heights = np.zeros((60, 40))
+    heights[20:40] = 0.1 * np.arange(20)[:, None]
+    return heights
+
+
+def test_a_slope_above_the_threshold_stays_a_slope_in_every_view(tmp_path):
+    made = import_array(tmp_path, ramp()).terrain_map
+    made.save(tmp_path / "map.npz")
+    loaded = tk.TerrainMap.load(tmp_path / "map.npz")
+    points = np.random.default_rng(0).uniform([2.1, 0.1], [3.9, 3.9], (200, 2))
+    on_ramp = points[:, 0] - 2.05
+    above = np.column_stack([points, np.full(200, 5.0)])
+    scan = HeightScan(loaded, [0.0], [0.0]).below(above, np.zeros(200))[:, 0]
+    rays = 5 - RayCaster(loaded).cast(above, np.tile([0.0, 0.0, -1.0], (200, 1)))
+    for seen in (made.height(points), loaded.height(points), scan, rays):
+        np.testing.assert_allclose(seen, on_ramp, atol=1e-4)
+    walls = loaded.height([[4.04, 2.0], [3.96, 2.0]])
+    assert walls.tolist() == pytest.approx([0.0, 1.9], abs=1e-3)
+    assert (loaded.walls > 0).sum() == 40
+    assert tk.TerrainMap.load(tmp_path / "map.npz").edited(heights=loaded.heights).walls is None
+    assert loaded.patch(0, 0).walls.shape == loaded.heights.shape
+
+
+def test_walls_are_stored_only_where_the_threshold_would_differ(tmp_path):
+    assert import_array(tmp_path, steps()).terrain_map.walls is None
+
+
+@pytest.mark.parametrize("value", [4, 255])
+def test_walls_out_of_range_are_rejected(tmp_path, value):
+    import_array(tmp_path, ramp()).terrain_map.save(tmp_path / "map.npz")
+    arrays = dict(np.load(tmp_path / "map.npz"))
+    arrays["walls"][3, 3] = value
+    np.savez(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(MapFileError, match="walls: got an edge out of range"):
+        tk.TerrainMap.load(tmp_path / "bad.npz")

@@ -32,7 +32,7 @@ def test_transformed_moves_everything_alike(matrix):
     ).transform(matrix)
     moved = matrix @ (peak - grid.center) + grid.center
     index = (moved - grid.lower) / grid.cell - 0.5
-    assert surface_at(patch.heights, index[None], threshold=np.inf).height == pytest.approx(2.0)
+    assert surface_at(patch.heights, index[None], rule=np.inf).height == pytest.approx(2.0)
     assert patch.friction.tobytes() == (patch.heights / 2).tobytes()
     assert patch.spawn == pytest.approx(moved)
     assert patch.goals[0, :3] == pytest.approx([*moved, 2.0])

@@ -46,7 +46,7 @@ def test_mesh_matches_the_surface(ray_down, build, heights, threshold):
     offsets = np.array([(0.03, 0.21), (0.22, 0.16), (0.09, 0.04)])
     corners = np.argwhere(np.ones([4 * n for n in heights.shape])) / 4
     place = (corners[:, None] + offsets).reshape(-1, 2)
-    surface = surface_at(heights, place - 0.5, threshold=threshold)
+    surface = surface_at(heights, place - 0.5, rule=threshold)
     found = ray_down(mesh.vertices, mesh.triangles, place)
     np.testing.assert_allclose(found, surface.height, atol=1e-4)
 
