@@ -132,10 +132,6 @@ def make_map(
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
-    walls = steps_of_one_cell(heights, config.wall_threshold)
-    edges = zip(wall_edges(heights, walls), wall_edges(heights, config.wall_threshold), strict=True)
-    if not all(np.array_equal(own, steep) for own, steep in edges):
-        terrain_map = replace(terrain_map, walls=walls)
     counts["num_missing"] = int(np.isnan(found).sum())
     report = make_report(terrain_map, source, origin, columns, **counts)
     return ImportedMap(terrain_map=replace(terrain_map, import_reports=(report,)), report=report)
@@ -252,10 +248,14 @@ def assemble_map(
         start = float(spawns[row, col][0, 2])
         measured[row, col] = measured_difficulty(block, config.cell, start)
     rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
+    walls = steps_of_one_cell(heights, config.wall_threshold)
+    edges = zip(wall_edges(heights, walls), wall_edges(heights, config.wall_threshold), strict=True)
+    is_as_usual = all(np.array_equal(own, steep) for own, steep in edges)
     return TerrainMap(
         config=config,
         grid=config.grid,
         heights=heights,
+        walls=None if is_as_usual else walls,
         friction=np.broadcast_to(np.float32(config.static_friction), heights.shape)
         if friction is None
         else friction,
