@@ -17,6 +17,7 @@ import sys
 import tomllib
 import warnings
 from enum import Enum
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -106,10 +107,14 @@ def test_each_replacement_is_for_a_line_of_a_page():
 def test_blocks_import_what_the_adapters_define():
     text = "\n".join(block for _, block in blocks_of_pages())
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", text, re.MULTILINE)
-    assert len(imports) == 9, "count the import of the new adapter here"
+    assert len(imports) == 10, "count the import of the new adapter here"
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
-        defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}
+        nodes = ast.parse(path.read_text()).body
+        imported = chain.from_iterable(
+            node.names for node in nodes if isinstance(node, ast.ImportFrom)
+        )
+        defined = {getattr(node, "name", "") for node in (*nodes, *imported)}
         assert set(names.split(", ")) <= defined, module
 
 

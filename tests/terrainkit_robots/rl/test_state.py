@@ -172,6 +172,8 @@ def read_feet(env, command):
 class _Steps(Plane):
     """A plane that is measured as steps along y, each from an edge to an edge at a height."""
 
+    is_plane = False
+
     steps = ()
 
     def height(self, _, y, *__, **___):
@@ -209,6 +211,8 @@ def test_feet_clear_no_edge_beside_them(nominal_env, quadruped):
 
 class _Stones(Plane):
     """A plane that is measured as stones around the point `at`, where gaps of a width cross."""
+
+    is_plane = False
 
     at, widths = (0.0, 0.0), (0.0, 0.0)
 
