@@ -80,7 +80,7 @@ class Import(ConfigCommand):
         lines = [
             f"{name}{line}"
             for name, report in zip(names, terrain_map.import_reports, strict=True)
-            for line in _report_lines(report, has_solids=options.solids)
+            for line in _report_lines(report, options)
         ]
         for line in lines[:_MAX_LINES]:
             render.result(line)
@@ -92,7 +92,15 @@ class Import(ConfigCommand):
         return 0
 
 
-def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
+def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[str]:
+    has_solids = options.solids
+    if report.hole_area:
+        yield (
+            f"holes {options.hole_depth:g} m deep where the mesh has no ground: "
+            f"{report.hole_area:.2f} m2 (--hole-depth; 0 fills them)"
+        )
+    if report.lost_ground_area >= 0.005:
+        yield f"the map has holes over {report.lost_ground_area:.2f} m2 where the file has ground"
     if report.num_missing or report.filled_area >= 0.005:
         total = report.covered_area + report.filled_area
         yield (

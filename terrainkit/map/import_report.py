@@ -35,6 +35,12 @@ class ImportReport:
     filled_area: float = 0.0
     """Area within the file where the map has ground and the file has none [m2]."""
 
+    lost_ground_area: float = 0.0
+    """Area where the file has ground and the map a hole [m2], more than a cell from its edge."""
+
+    hole_area: float = 0.0
+    """Area of the holes where a mesh has no ground [m2]."""
+
     num_lost_faces: int = 0
     """Number of faces of a mesh that reach more than half a cell above the map: parts narrower than
     a cell, or overhangs without a solid."""

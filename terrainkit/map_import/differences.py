@@ -55,6 +55,7 @@ def make_report(
     source: Source,
     origin: Array,
     columns: Columns | None,
+    holes: NDArray[np.bool_],
     **counts: Any,
 ) -> ImportReport:
     """Compare a map with its source.
@@ -64,6 +65,7 @@ def make_report(
         source: The ground of the file, in the frame of the file.
         origin: Point of the file that is at (0, 0, 0) in the map, shape (3,) [m].
         columns: The columns of a mesh at the samples of the map, in the frame of the map.
+        holes: Samples of the map that are in a hole of a mesh.
         counts: Fields of the report that are known.
     """
     grid, is_mesh = terrain_map.grid, isinstance(source, MeshSource)
@@ -86,7 +88,13 @@ def make_report(
             lost.append((apart[k], *block[k], map_top[k]))
         worst += _distinct(np.column_stack([apart, block[:, :2]]), grid.cell)
     largest = _distinct(np.array(worst).reshape(-1, 3), grid.cell)
-    area, share = float(size.prod()), float(is_ground.sum()) / max(1, len(places))
+    # The edge of a hole moves by up to half a cell.
+    index = (places - terrain_map.first_sample) / grid.cell
+    near = np.clip([np.floor(index), np.ceil(index)], 0, np.array(grid.shape) - 1).astype(int)
+    hole_corners = [holes[i, j] for i in near[..., 0] for j in near[..., 1]]
+    is_filled = ~is_ground & ~np.any(hole_corners, axis=0)
+    is_lost = is_ground & np.all(hole_corners, axis=0)
+    area_per_point = float(size.prod()) / max(1, len(places))
     num_hidden = 0 if columns is None else int((columns.sheets > grid.cell / 2).sum())
     fields: dict[str, Any] = {**_overhangs(terrain_map, columns), **counts}
     if num_lost:
@@ -100,8 +108,10 @@ def make_report(
     return ImportReport(
         num_points=len(error),
         further_errors=tuple(place for place in largest[1:] if place[0] > TOLERANCES[0]),
-        covered_area=area * share,
-        filled_area=area * (1 - share),
+        covered_area=float(is_ground.sum()) * area_per_point,
+        filled_area=float(is_filled.sum()) * area_per_point,
+        lost_ground_area=float(is_lost.sum()) * area_per_point,
+        hole_area=int(holes.sum()) * grid.cell**2,
         num_lost_faces=num_lost,
         hidden_area=num_hidden * grid.cell**2,
         **fields,

@@ -15,6 +15,7 @@ from terrainkit.geometry.solids import Solids
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.ground_friction import read_friction
 from terrainkit.importing.height_source import Source, fill_missing, open_source
+from terrainkit.importing.holes import dig_holes
 from terrainkit.importing.import_options import ImportOptions
 from terrainkit.importing.mesh_source import MeshSource
 from terrainkit.importing.overhangs import find_bodies, overhang_solids
@@ -49,6 +50,9 @@ class ImportedMap:
 
     report: ImportReport
     """The differences."""
+
+    holes: NDArray[np.bool_]
+    """Samples of the map that are in a hole of a mesh."""
 
 
 def import_map(
@@ -152,6 +156,9 @@ def make_map_steps(
             solids = assign_solids(config, parts)
     else:
         found = source.heights(x, y) - origin[2]
+    holes = np.zeros(found.shape, dtype=bool)
+    if isinstance(source, MeshSource):
+        found, holes = dig_holes(found, options.hole_depth)
     # A sum with 0 makes -0 to 0.
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32) + np.float32(0)
     if not (np.abs(heights) <= MAX_VALUE).all():
@@ -159,12 +166,13 @@ def make_map_steps(
     friction = read_friction(options, source, x, y)
     yield None
     relax = options.spawn_tolerance is None
-    config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
+    config, spawns = place_spawns(config, heights, solids, holes, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
     counts["num_missing"] = int(np.isnan(found).sum())
     yield None
-    report = make_report(terrain_map, source, origin, columns, **counts)
-    yield ImportedMap(terrain_map=replace(terrain_map, import_reports=(report,)), report=report)
+    report = make_report(terrain_map, source, origin, columns, holes, **counts)
+    terrain_map = replace(terrain_map, import_reports=(report,))
+    yield ImportedMap(terrain_map=terrain_map, report=report, holes=holes)
 
 
 def make_config(

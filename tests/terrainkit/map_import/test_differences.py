@@ -76,7 +76,9 @@ def break_sampler(monkeypatch, change):
 
 def report_of(path):
     options = {"file_cell": CELL} if path.suffix == ".npy" else {"up": "z"}
-    return import_map(path, ImportOptions(cell=CELL, missing="lowest", **options)).report
+    return import_map(
+        path, ImportOptions(cell=CELL, missing="lowest", hole_depth=0.0, **options)
+    ).report
 
 
 SUFFIXES = ("npy", "ply", "xyz")
