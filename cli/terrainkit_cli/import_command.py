@@ -109,12 +109,11 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
         )
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
-    if report.lost_at:
+    if report.num_lost_faces:
         hint = "" if has_solids else ", or --solids for closed bodies"
         yield (
-            f"the file reaches {report.lost_top:.2f} m at {_place(report.lost_at)}, the map "
-            f"{report.map_top:.2f} m: parts narrower than a cell are lost, "
-            f"{report.num_lost_faces} faces (smaller --cell{hint})"
+            f"parts narrower than a cell are lost: {report.num_lost_faces} faces reach more than "
+            f"half a cell above the map (smaller --cell{hint})"
         )
     if report.overhang_error_at:
         hint = "" if has_solids else "; --solids keeps overhangs of closed bodies"
@@ -128,7 +127,7 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
             f"surfaces without thickness are above each other over {report.hidden_area:.2f} m2, "
             "such as floors of a building; the map has only the highest"
         )
-    if report.num_open_bodies and (report.lost_area or report.lost_at):
+    if report.num_open_bodies and (report.lost_area or report.num_lost_faces):
         yield f"bodies that are not closed, and cannot become solids: {report.num_open_bodies}"
     if report.num_points:
         yield f"compared with the file at {report.num_points} points: {_differences(report)}"

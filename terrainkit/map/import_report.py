@@ -15,8 +15,7 @@ class ImportReport:
     surface was compared with that of the map."""
 
     shares: tuple[float, ...] = ()
-    """Shares of these points with a difference of at most 1 cm, 5 cm and a cell; empty without
-    points."""
+    """Shares of these points with a difference of at most 1 cm, 5 cm and a cell."""
 
     max_error: float = 0.0
     """Largest difference between the highest surfaces of the file and the map [m], also at the
@@ -44,15 +43,6 @@ class ImportReport:
     num_lost_faces: int = 0
     """Number of faces of a mesh that reach more than half a cell above the map: parts narrower than
     a cell, or overhangs without a solid."""
-
-    lost_top: float = 0.0
-    """Height of the mesh where such a face is farthest above the map [m]."""
-
-    map_top: float = 0.0
-    """Height of the map there [m]."""
-
-    lost_at: tuple[float, float] | None = None
-    """Where that is in the map, x and y [m]."""
 
     overhang_area: float = 0.0
     """Area over which a part of the mesh hangs over the ground [m2]."""

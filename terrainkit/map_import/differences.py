@@ -75,17 +75,14 @@ def make_report(
     points = surface_points(source, places + origin[:2], grid.cell) - origin
     is_known = ~np.isnan(points[..., 2])
     errors = np.full(is_known.shape, np.inf)
-    errors[is_known], _ = _height_errors(terrain_map, points[is_known], is_exact=is_mesh)
+    errors[is_known] = _height_errors(terrain_map, points[is_known], is_exact=is_mesh)
     is_ground = is_known.any(axis=1)
     error = errors.min(axis=1)[is_ground]
     worst = _distinct(np.column_stack([error, places[is_ground]]), grid.cell)
-    lost, num_lost = [], 0
+    num_lost = 0
     for block in _extreme_points(terrain_map, source, origin):
-        apart, map_top = _height_errors(terrain_map, block, only_above=is_mesh)
-        if is_mesh:
-            num_lost += int((apart > grid.cell / 2).sum())
-            k = int(np.argmax(apart))
-            lost.append((apart[k], *block[k], map_top[k]))
+        apart = _height_errors(terrain_map, block, only_above=is_mesh)
+        num_lost += int((apart > grid.cell / 2).sum()) if is_mesh else 0
         worst += _distinct(np.column_stack([apart, block[:, :2]]), grid.cell)
     largest = _distinct(np.array(worst).reshape(-1, 3), grid.cell)
     # The edge of a hole moves by up to half a cell.
@@ -97,16 +94,12 @@ def make_report(
     area_per_point = float(size.prod()) / max(1, len(places))
     num_hidden = 0 if columns is None else int((columns.sheets > grid.cell / 2).sum())
     fields: dict[str, Any] = {**_overhangs(terrain_map, columns), **counts}
-    if num_lost:
-        _, x, y, lost_top, top = map(float, max(lost))
-        fields.update(lost_at=(x, y), lost_top=lost_top, map_top=top)
     if largest:
         fields.update(max_error=largest[0][0], max_error_at=largest[0][1:])
-    if len(error):
-        limits = (*TOLERANCES, grid.cell)
-        fields["shares"] = tuple(float((error <= limit).mean()) for limit in limits)
+    number = max(1, len(error))
     return ImportReport(
         num_points=len(error),
+        shares=tuple(int((error <= limit).sum()) / number for limit in (*TOLERANCES, grid.cell)),
         further_errors=tuple(place for place in largest[1:] if place[0] > TOLERANCES[0]),
         covered_area=float(is_ground.sum()) * area_per_point,
         filled_area=float(is_filled.sum()) * area_per_point,
@@ -184,8 +177,8 @@ def _sample_points(raster: Raster) -> Iterator[Array]:
 
 def _height_errors(
     terrain_map: TerrainMap, points: Array, *, only_above: bool = False, is_exact: bool = False
-) -> tuple[Array, Array]:
-    """Return the difference of each point from the map seen from above, and the map's height.
+) -> Array:
+    """Return the difference of each point from the map seen from above.
 
     A wall of the map is up to half a cell from that of its file. In a cell with a wall, the heights
     of all its samples are therefore no difference.
@@ -214,7 +207,7 @@ def _height_errors(
     rows = np.flatnonzero(error > _ROUNDING)
     walls = _wall_errors(terrain_map, points[rows], top[rows], is_exact=is_exact)
     error[rows] = np.minimum(error[rows], walls)
-    return error, top
+    return error
 
 
 def _wall_errors(terrain_map: TerrainMap, points: Array, top: Array, *, is_exact: bool) -> Array:

@@ -207,7 +207,7 @@ def _import_patch(
     types = np.zeros((1, 1), dtype=np.int32)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*heights are missing", TerrainkitWarning)
-        imported = import_map.make_map(path, source, anywhere, origin, place, center, types)
+        *_, imported = import_map.make_map(path, source, anywhere, origin, place, center, types)
     made, grid = imported.terrain_map, config.grid
     edges = np.ones(grid.shape, dtype=bool)
     edges[1:-1, 1:-1] = False

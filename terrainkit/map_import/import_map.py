@@ -100,17 +100,10 @@ def _import_steps(path: Path, options: ImportOptions) -> Iterator[Any]:
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
     types = np.zeros(size, dtype=np.int32)
     spawn_xy = centers.reshape(*size, 2)
-    yield from make_map_steps(path, source, config, origin, options, spawn_xy, types)
+    yield from make_map(path, source, config, origin, options, spawn_xy, types)
 
 
-def make_map(*arguments: Any) -> ImportedMap:
-    """Return the map that `make_map_steps` makes of its arguments."""
-    *_, imported = make_map_steps(*arguments)
-    made: ImportedMap = imported
-    return made
-
-
-def make_map_steps(
+def make_map(
     path: Path,
     source: Source,
     config: MapConfig,

@@ -88,8 +88,8 @@ def test_import_reports_what_is_lost(terrainkit, tmp_path):
     trimesh.util.concatenate(parts).export(tmp_path / "a.stl")
     lost = terrainkit("import", "a.stl", "-o", "a.npz").stdout
     assert (
-        "the map 0.00 m: parts narrower than a cell are lost, 10 faces (smaller --cell, or --solids"
-        in lost
+        "parts narrower than a cell are lost: 10 faces reach more than half a cell above the map "
+        "(smaller --cell, or --solids for closed bodies)\n" in lost
     )
     kept = terrainkit("import", "a.stl", "-o", "b.npz", "--solids").stdout
     assert "closed bodies narrower than a cell, now solids: 1" in kept
