@@ -93,7 +93,6 @@ class Import(ConfigCommand):
 
 
 def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[str]:
-    has_solids = options.solids
     if report.hole_area:
         yield (
             f"holes {options.hole_depth:g} m deep where the mesh has no ground: "
@@ -110,13 +109,13 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
     if report.num_lost_faces:
-        hint = "" if has_solids else ", or --solids for closed bodies"
+        hint = "" if options.solids else ", or --solids for closed bodies"
         yield (
             f"parts narrower than a cell are lost: {report.num_lost_faces} faces reach more than "
             f"half a cell above the map (smaller --cell{hint})"
         )
     if report.overhang_error_at:
-        hint = "" if has_solids else "; --solids keeps overhangs of closed bodies"
+        hint = "" if options.solids else "; --solids keeps overhangs of closed bodies"
         error, at = report.overhang_error, _place(report.overhang_error_at)
         yield (
             f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "

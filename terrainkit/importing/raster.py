@@ -138,9 +138,8 @@ def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float)
         low + (np.arange(count) + 0.5) * cell
         for low, count in zip(source.lower, counts, strict=True)
     )
-    heights = source.heights(x, y)
-    if source.cell is None:  # a mesh
-        heights, _ = dig_holes(heights, options.hole_depth)
+    # Only a mesh, which has no cell, has holes.
+    heights, _ = dig_holes(source.heights(x, y), 0.0 if source.cell else options.hole_depth)
     heights = fill_missing(path, heights, missing, x, y)
     return Raster(values=heights.astype(np.float32), spacing=(cell, cell), lower=source.lower)
 

@@ -99,8 +99,7 @@ def _import_steps(path: Path, options: ImportOptions) -> Iterator[Any]:
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
     types = np.zeros(size, dtype=np.int32)
-    spawn_xy = centers.reshape(*size, 2)
-    yield from make_map(path, source, config, origin, options, spawn_xy, types)
+    yield from make_map(path, source, config, origin, options, centers.reshape(*size, 2), types)
 
 
 def make_map(
@@ -149,9 +148,7 @@ def make_map(
             solids = assign_solids(config, parts)
     else:
         found = source.heights(x, y) - origin[2]
-    holes = np.zeros(found.shape, dtype=bool)
-    if isinstance(source, MeshSource):
-        found, holes = dig_holes(found, options.hole_depth)
+    found, holes = dig_holes(found, options.hole_depth if columns else 0.0)
     # A sum with 0 makes -0 to 0.
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32) + np.float32(0)
     if not (np.abs(heights) <= MAX_VALUE).all():

@@ -134,3 +134,12 @@ def test_holes_of_a_mesh_in_a_generated_map(tmp_path):
         tk.MapConfig(rows=1, cols=1, patch_size=(8.0, 6.0), border=0.0, terrains=(terrain,))
     )
     assert made.height([2.0, 3.0]) == pytest.approx(-2.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("width", "is_hole"), [(0.001, False), (0.04, False), (0.06, True)])
+def test_crack_narrower_than_half_a_cell_is_no_hole(tmp_path, width, is_hole):
+    # The crack is at the samples of x = 4.05 m.
+    parts = [sheet(0, 4.05 - width / 2, 0, 4, 0.1), sheet(4.05 + width / 2, 8, 0, 4, 0.1)]
+    imported = import_map(save(tmp_path, parts))
+    assert imported.terrain_map.height([4.05, 2.0]) == pytest.approx(-1.9 if is_hole else 0.1)
+    assert imported.report.hole_area == pytest.approx(0.4 if is_hole else 0.0)

@@ -59,6 +59,20 @@ def test_import_whole_file_is_one_patch_that_records_it(tmp_path):
     assert loaded.config.terrains[0].terrain == "imported"
 
 
+def test_import_wraps_its_steps_for_a_progress_bar(tmp_path):
+    seen = []
+
+    def progress(steps, total):
+        for number, step in enumerate(steps):
+            seen.append((number, total))
+            yield step
+
+    options = ImportOptions(file_cell=0.1)
+    imported = import_map(save(tmp_path, steps()), options, progress=progress)
+    assert seen == [(0, 4), (1, 4), (2, 4), (3, 4)]
+    assert imported.terrain_map.grid.shape == (60, 40)
+
+
 def test_import_split_into_patches(tmp_path):
     terrain_map = import_array(tmp_path, steps(), patch_size=(3.0, 2.0)).terrain_map
     np.testing.assert_allclose(terrain_map.env_origins[..., 2], [[0, 0.1], [0.2, 0.3]], atol=1e-6)
