@@ -1,6 +1,7 @@
 """The command import: a file of heights or a mesh becomes a map."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,8 +31,9 @@ class Import(ConfigCommand):
     """Import heights, meshes or point clouds as a map.
 
     Several files, or the files in a folder, become levels of difficulty: the rows, easiest first.
-    The report says the largest difference in height from the file, and what the map lost: parts
-    that are narrower than a cell or hang over the ground.
+    The report compares the map with the file at points that are not its samples. It gives the
+    largest differences, ground that the file does not have, and parts that are lost because they
+    are narrower than a cell or hang over the ground.
     """
 
     files: Annotated[tuple[Path, ...], positional("FILE...")]
@@ -63,7 +65,8 @@ class Import(ConfigCommand):
         if len(self.files) == 1 and not self.files[0].is_dir():
             if self.blend != Import.blend:
                 raise ConfigError("--blend: got one file; expected several files")
-            terrain_map = import_map(self.files[0], options).terrain_map
+            progress = partial(render.progress, of="steps")
+            terrain_map = import_map(self.files[0], options, progress=progress).terrain_map
             names = [""]
         else:
             progress = partial(render.progress, of="files")
@@ -77,7 +80,7 @@ class Import(ConfigCommand):
         lines = [
             f"{name}{line}"
             for name, report in zip(names, terrain_map.import_reports, strict=True)
-            for line in _report_lines(report, has_solids=options.solids)
+            for line in _report_lines(report, options)
         ]
         for line in lines[:_MAX_LINES]:
             render.result(line)
@@ -89,20 +92,30 @@ class Import(ConfigCommand):
         return 0
 
 
-def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
-    if report.num_missing:
-        yield f"filled missing heights: {report.num_missing}"
+def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[str]:
+    if report.hole_area:
+        yield (
+            f"holes {options.hole_depth:g} m deep where the mesh has no ground: "
+            f"{report.hole_area:.2f} m2 (--hole-depth; 0 fills them)"
+        )
+    if report.lost_ground_area >= 0.005:
+        yield f"the map has holes over {report.lost_ground_area:.2f} m2 where the file has ground"
+    if report.num_missing or report.filled_area >= 0.005:
+        total = report.covered_area + report.filled_area
+        yield (
+            f"filled missing heights: {report.num_missing}; the map has ground over "
+            f"{report.filled_area:.2f} m2 of {total:.2f} m2 where the file has none"
+        )
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
-    if report.lost_at:
-        hint = "" if has_solids else ", or --solids for closed bodies"
+    if report.num_lost_faces:
+        hint = "" if options.solids else ", or --solids for closed bodies"
         yield (
-            f"the file reaches {report.lost_top:.2f} m at {_place(report.lost_at)}, the map "
-            f"{report.map_top:.2f} m: parts narrower than a cell are lost, "
-            f"{report.num_lost_faces} faces (smaller --cell{hint})"
+            f"parts narrower than a cell are lost: {report.num_lost_faces} faces reach more than "
+            f"half a cell above the map (smaller --cell{hint})"
         )
     if report.overhang_error_at:
-        hint = "" if has_solids else "; --solids keeps overhangs of closed bodies"
+        hint = "" if options.solids else "; --solids keeps overhangs of closed bodies"
         error, at = report.overhang_error, _place(report.overhang_error_at)
         yield (
             f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
@@ -113,14 +126,22 @@ def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
             f"surfaces without thickness are above each other over {report.hidden_area:.2f} m2, "
             "such as floors of a building; the map has only the highest"
         )
-    if report.num_open_bodies and (report.lost_area or report.lost_at):
+    if report.num_open_bodies and (report.lost_area or report.num_lost_faces):
         yield f"bodies that are not closed, and cannot become solids: {report.num_open_bodies}"
-    at = f" at {_place(report.max_error_at)}" if report.max_error_at else ""
-    yield (
-        f"largest difference from the file {report.max_error:.3f} m{at}, apart from walls, which "
-        "move by less than a cell"
-    )
+    if report.num_points:
+        yield f"compared with the file at {report.num_points} points: {_differences(report)}"
 
 
-def _place(xy: tuple[float, float]) -> str:
+def _differences(report: "ImportReport") -> str:
+    if not report.max_error_at or report.max_error <= 0.01:
+        return "all within 1 cm"
+    shares: dict[float, str] = {}
+    for share, limit in zip(report.shares, ("1 cm", "5 cm", "a cell"), strict=True):
+        shares.setdefault(share, f"{math.floor(1000 * share) / 10:g}% within {limit}")
+    places = [(report.max_error, *report.max_error_at), *report.further_errors]
+    largest = ", ".join(f"{error:.3f} m at {_place(xy)}" for error, *xy in places)
+    return f"{', '.join(shares.values())}; largest differences: {largest}"
+
+
+def _place(xy: Sequence[float]) -> str:
     return f"({xy[0]:.2f}, {xy[1]:.2f})"

@@ -1,4 +1,6 @@
-"""TriangleTree: the first triangle that a ray meets, where embree is not installed."""
+"""The first triangle that a ray meets: by embree, or in a tree of boxes."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,3 +81,21 @@ class TriangleTree:
         t = left / np.where(rate == 0, np.nan, rate)
         meets = (sides.min(axis=1) >= 0) | (sides.max(axis=1) <= 0)
         return np.where(meets & (t >= 0), t, np.inf)
+
+
+def first_triangle(vertices: Floats, triangles: NDArray[Any]) -> Any:
+    """Return `TriangleTree.first` of triangles, computed by embree where it is installed."""
+    try:
+        from embreex import mesh_construction, rtcore_scene
+    except ImportError:
+        return TriangleTree(vertices, triangles).first
+    scene = rtcore_scene.EmbreeScene(robust=True)
+    mesh_construction.TriangleMesh(scene, vertices, triangles)
+
+    def first(origins: Floats, directions: Floats, limit: float) -> Any:
+        limits = np.full(len(origins), min(limit, 1e30), np.float32)
+        starts, steps = origins.astype(np.float32), directions.astype(np.float32)
+        found = scene.run(starts, steps, limits, output=True)
+        return found["primID"], found["tfar"]
+
+    return first

@@ -16,7 +16,7 @@ MAX_SAMPLES = 1 << 22
 """Most samples of a mesh whose unit is not stated, 205 m x 205 m with cells of 0.1 m. More are
 usually a file in millimeters, and take minutes."""
 
-LARGE = 100.0
+LARGE = 500.0
 """Side of a mesh above which the unit is doubtful if it is not stated [m]."""
 
 MAX_SIDE = 10_000.0

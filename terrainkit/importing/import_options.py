@@ -60,6 +60,10 @@ class ReadOptions(Config):
     key: str = ""
     """Name of the array in an .npz file; empty: the only one with two axes."""
 
+    hole_depth: NonNegative = 2.0
+    """Depth of holes [m]: missing ground inside a mesh or a scene, and all missing ground if its
+    parts stand apart; 0: missing heights."""
+
     up: UpAxis = "auto"
     """Axis of a mesh or point cloud that points up; auto: y for glTF, what a .dae states, z for
     others."""

@@ -33,6 +33,9 @@ _ASIDE = 1e-4
 """Distance by which a sample is moved aside [steps]: bodies that should touch at a round number are
 often a rounding error apart, and a sample there would be on the ground between them."""
 
+_CRACK = 0.25
+"""Distance to both sides within which a sample has ground if it is in a crack [steps]."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshSource(VertexSource):
@@ -63,17 +66,21 @@ class MeshSource(VertexSource):
             y: Positions along y [m], increasing and evenly spaced, shape (ny,).
         """
         inner, number = cover_positions((x, y), self.lower, self.upper)
-        aside = [lines + _ASIDE * np.ptp(lines[:2]) for lines in inner]
-        found = make_columns(self.vertices, self.faces, *aside)
-        if all(len(a) == len(b) for a, b in zip(inner, (x, y), strict=True)):
-            return found
-        cells = np.ix_(*number)
-        return Columns(
-            top=found.top[cells],
-            floor=found.floor[cells],
-            ceiling=found.ceiling[cells],
-            sheets=found.sheets[cells],
-        )
+        steps = [np.ptp(lines[:2]) for lines in inner]
+        aside = [lines + _ASIDE * step for lines, step in zip(inner, steps, strict=True)]
+        found = vars(make_columns(self.vertices, self.faces, *aside))
+        is_missing = np.isnan(found["top"])
+        if is_missing.any():
+            cells = np.ix_(is_missing.any(axis=1), is_missing.any(axis=0))
+            lines = [aside[k][is_missing.any(axis=1 - k)] for k in (0, 1)]
+            before, after = (
+                make_columns(self.vertices, self.faces, *(lines[k] + c * steps[k] for k in (0, 1)))
+                for c in (-_CRACK, _CRACK)
+            )
+            is_crack = is_missing[cells] & ~np.isnan(before.top + after.top)
+            for name, values in found.items():
+                values[cells] = np.where(is_crack, vars(before)[name], values[cells])
+        return Columns(**{name: values[np.ix_(*number)] for name, values in found.items()})
 
 
 def read(path: Path, options: ReadOptions) -> Source:

@@ -12,6 +12,7 @@ from terrainkit.files.memory import check_memory
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.georeference import Georeference
 from terrainkit.importing.height_source import Array, fill_missing, open_source, warn
+from terrainkit.importing.holes import dig_holes
 from terrainkit.importing.import_options import Missing, ReadOptions
 from terrainkit.importing.nodata import find_nodata
 from terrainkit.settings.type_hint import MAX_VALUE
@@ -137,7 +138,9 @@ def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float)
         low + (np.arange(count) + 0.5) * cell
         for low, count in zip(source.lower, counts, strict=True)
     )
-    heights = fill_missing(path, source.heights(x, y), missing, x, y)
+    # Only a mesh, which has no cell, has holes.
+    heights, _ = dig_holes(source.heights(x, y), 0.0 if source.cell else options.hole_depth)
+    heights = fill_missing(path, heights, missing, x, y)
     return Raster(values=heights.astype(np.float32), spacing=(cell, cell), lower=source.lower)
 
 

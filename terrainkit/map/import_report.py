@@ -10,25 +10,39 @@ class ImportReport:
     num_missing: int = 0
     """Number of missing heights, which were filled."""
 
+    num_points: int = 0
+    """Number of points, not the samples of the map, where the file has ground and its highest
+    surface was compared with that of the map."""
+
+    shares: tuple[float, ...] = ()
+    """Shares of these points with a difference of at most 1 cm, 5 cm and a cell."""
+
     max_error: float = 0.0
-    """Largest difference between the highest surfaces of the file and the map [m]. A wall is
-    allowed to be in another place between the same two samples."""
+    """Largest difference between the highest surfaces of the file and the map [m], also at the
+    corners of the faces of a mesh and the samples of a raster. A wall is allowed to be in another
+    place between the same two samples."""
 
     max_error_at: tuple[float, float] | None = None
     """Where that is in the map, x and y [m]."""
 
+    further_errors: tuple[tuple[float, float, float], ...] = ()
+    """The next differences above 1 cm that are at least ten cells away, with their x and y [m]."""
+
+    covered_area: float = 0.0
+    """Area of the map where the file has ground [m2]."""
+
+    filled_area: float = 0.0
+    """Area within the file where the map has ground and the file has none [m2]."""
+
+    lost_ground_area: float = 0.0
+    """Area where the file has ground and the map a hole [m2], more than a cell from its edge."""
+
+    hole_area: float = 0.0
+    """Area of the holes where a mesh has no ground [m2]."""
+
     num_lost_faces: int = 0
     """Number of faces of a mesh that reach more than half a cell above the map: parts narrower than
     a cell, or overhangs without a solid."""
-
-    lost_top: float = 0.0
-    """Height of the mesh where such a face is farthest above the map [m]."""
-
-    map_top: float = 0.0
-    """Height of the map there [m]."""
-
-    lost_at: tuple[float, float] | None = None
-    """Where that is in the map, x and y [m]."""
 
     overhang_area: float = 0.0
     """Area over which a part of the mesh hangs over the ground [m2]."""

@@ -36,6 +36,9 @@ class SpawnGround:
     solids: Solids
     """Solids that reach into the patch."""
 
+    holes: NDArray[np.bool_] | None = None
+    """Samples that are no center of a disk, shape `grid.shape`; None for none."""
+
     @classmethod
     def of_map(
         cls, config: MapConfig, heights: NDArray[np.float32], solids: Solids, patch: tuple[int, int]
@@ -253,15 +256,19 @@ class SpawnGround:
         return cells, np.column_stack([x, y, lows[index], highs[index]])
 
     def _is_free(self, disks: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return whether no solid is above each disk within the headroom, shape (n,).
+        """Return whether each disk is on ground, and no solid is within the headroom, shape (n,).
 
         Args:
             disks: Center and lowest and highest ground of each disk, x, y, low, high [m], shape
                 (n, 4).
         """
         solids, radius = self.solids, self.config.spawn_radius
+        is_ground = np.ones(len(disks), dtype=bool)
+        if self.holes is not None:
+            cells = np.floor((disks[:, :2] - self.grid.lower) / self.grid.cell).astype(int)
+            is_ground = ~self.holes[tuple(cells.T)]
         if not len(disks) or not len(solids):
-            return np.ones(len(disks), dtype=bool)
+            return is_ground
         # Most solids are far from the preferred position; the index of a few is made much faster.
         centers, low, high = disks[:, :2], disks[:, 2:3], disks[:, 3:]
         lower, upper = (corner[:, :2] for corner in solids.bounds())
@@ -271,7 +278,7 @@ class SpawnGround:
         bounds = SolidIndex(solids, radius=radius).intervals(centers)
         bottom, top = np.moveaxis(bounds, -1, 0)
         is_blocked = (top > low + CONTACT) & (bottom < high + self.config.spawn_headroom)
-        return np.asarray(~is_blocked.any(axis=1))
+        return np.asarray(is_ground & ~is_blocked.any(axis=1))
 
     def _contains_disk(self, point: tuple[float, float]) -> bool:
         """Return whether the spawn disk around a point is inside the patch."""

@@ -207,7 +207,7 @@ def _import_patch(
     types = np.zeros((1, 1), dtype=np.int32)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*heights are missing", TerrainkitWarning)
-        imported = import_map.make_map(path, source, anywhere, origin, place, center, types)
+        *_, imported = import_map.make_map(path, source, anywhere, origin, place, center, types)
     made, grid = imported.terrain_map, config.grid
     edges = np.ones(grid.shape, dtype=bool)
     edges[1:-1, 1:-1] = False
@@ -216,7 +216,7 @@ def _import_patch(
     heights = ((made.heights - level) * weights).astype(np.float32)
     solids = made.solids.transform(np.eye(3), (0.0, 0.0, -level))
     with prefixed_errors(f"{path}: "):
-        placed = place_on_flattest(config, heights, solids, (0, 0), center[0, 0])
+        placed = place_on_flattest(config, heights, solids, imported.holes, (0, 0), center[0, 0])
     spawns, tolerance = placed
     config = replace(config, spawn_tolerance=tolerance)
     made = replace(made, config=config, heights=heights, solids=solids, spawns=spawns[None, None])

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from terrainkit.geometry.walls import steps_of_one_cell, wall_edges
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.ground_friction import read_friction
 from terrainkit.importing.height_source import Source, fill_missing, open_source
+from terrainkit.importing.holes import dig_holes
 from terrainkit.importing.import_options import ImportOptions
 from terrainkit.importing.mesh_source import MeshSource
 from terrainkit.importing.overhangs import find_bodies, overhang_solids
@@ -31,6 +33,11 @@ from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.parameter import MAX_TEXT_LENGTH
 from terrainkit.terrain.sub_terrain import SubTerrain
 
+StepProgress = Callable[[Iterator[Any], int], Iterator[Any]]
+
+_NUM_STEPS = 4
+"""Steps of an import: reading, sampling, spawn positions, and the comparison with the file."""
+
 DEFAULT_CELL = 0.1
 """Distance between two samples of a map that is made from a mesh [m]."""
 
@@ -45,8 +52,16 @@ class ImportedMap:
     report: ImportReport
     """The differences."""
 
+    holes: NDArray[np.bool_]
+    """Samples of the map that are in a hole of a mesh."""
 
-def import_map(path: str | Path, options: ImportOptions | None = None) -> ImportedMap:
+
+def import_map(
+    path: str | Path,
+    options: ImportOptions | None = None,
+    *,
+    progress: StepProgress | None = None,
+) -> ImportedMap:
     """Return the map of a file of heights or a mesh.
 
     The difficulty of a patch is its rank by `measured_difficulty`, from 0 for the easiest to
@@ -55,6 +70,7 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     Args:
         path: The file: heights, a mesh, a point cloud or an MJCF scene; see docs/importing.md.
         options: How it becomes a map.
+        progress: Wraps the steps of the import, given their number, for a progress bar.
 
     Warns:
         TerrainkitWarning: if heights are missing, an image has 8 bits only, cells are not squares,
@@ -67,9 +83,16 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
             no place to spawn.
         MemoryLimitError: if the map would not fit in memory.
     """
-    path = Path(path)
-    options = options or ImportOptions()
+    steps = _import_steps(Path(path), options or ImportOptions())
+    imported: ImportedMap
+    *_, imported = progress(steps, _NUM_STEPS) if progress else steps
+    return imported
+
+
+def _import_steps(path: Path, options: ImportOptions) -> Iterator[Any]:
+    """Yield None after each step, and the map last."""
     source = open_source(path, options)
+    yield None
     check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
     terrain = sub_terrain(path, path.stem, options)
     config, origin = make_config(path, source, options, terrain)
@@ -77,7 +100,7 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
     types = np.zeros(size, dtype=np.int32)
-    return make_map(path, source, config, origin, options, centers.reshape(*size, 2), types)
+    yield from make_map(path, source, config, origin, options, centers.reshape(*size, 2), types)
 
 
 def make_map(
@@ -88,8 +111,10 @@ def make_map(
     options: ImportOptions,
     spawn_xy: NDArray[np.float64],
     terrain_types: NDArray[np.int32],
-) -> ImportedMap:
-    """Return the map of a source whose extent has been checked.
+) -> Iterator[Any]:
+    """Make the map of a source whose extent has been checked: yield None after each step.
+
+    The last item is the `ImportedMap`.
 
     Args:
         path: The file, for errors.
@@ -124,17 +149,21 @@ def make_map(
             solids = assign_solids(config, parts)
     else:
         found = source.heights(x, y) - origin[2]
+    found, holes = dig_holes(found, options.hole_depth if columns else 0.0)
     # A sum with 0 makes -0 to 0.
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32) + np.float32(0)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
     friction = read_friction(options, source, x, y)
+    yield None
     relax = options.spawn_tolerance is None
-    config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
+    config, spawns = place_spawns(config, heights, solids, holes, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
     counts["num_missing"] = int(np.isnan(found).sum())
-    report = make_report(terrain_map, source, origin, columns, **counts)
-    return ImportedMap(terrain_map=replace(terrain_map, import_reports=(report,)), report=report)
+    yield None
+    report = make_report(terrain_map, source, origin, columns, holes, **counts)
+    terrain_map = replace(terrain_map, import_reports=(report,))
+    yield ImportedMap(terrain_map=terrain_map, report=report, holes=holes)
 
 
 def make_config(

@@ -24,6 +24,7 @@ def place_spawns(
     config: MapConfig,
     heights: NDArray[np.float32],
     solids: Solids,
+    holes: NDArray[np.bool_],
     spawn_xy: NDArray[np.float64],
     *,
     relax: bool,
@@ -34,6 +35,7 @@ def place_spawns(
         config: Configuration of the map.
         heights: Heights of the map [m].
         solids: Solids of the map.
+        holes: Samples where no robot starts.
         spawn_xy: Preferred spawn position of each patch, shape (rows, cols, 2) [m].
         relax: As of `relaxed_config`.
 
@@ -47,7 +49,7 @@ def place_spawns(
     spawns = np.empty((config.rows, config.cols), dtype=object)
     tolerances = {}
     for patch in np.ndindex(spawns.shape):
-        placed = place_on_flattest(config, heights, solids, patch, spawn_xy[patch])
+        placed = place_on_flattest(config, heights, solids, holes, patch, spawn_xy[patch])
         spawns[patch], tolerances[patch] = placed
     return relaxed_config(config, tolerances, relax=relax), spawns
 
@@ -56,6 +58,7 @@ def place_on_flattest(
     config: MapConfig,
     heights: NDArray[np.float32],
     solids: Solids,
+    holes: NDArray[np.bool_],
     patch: Index,
     spawn_xy: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], float]:
@@ -68,6 +71,7 @@ def place_on_flattest(
         config: Configuration of the map.
         heights: Heights of the map [m].
         solids: Solids of the map.
+        holes: Samples where no robot starts.
         patch: Row and column of the patch.
         spawn_xy: Preferred spawn position, x and y [m].
 
@@ -78,6 +82,7 @@ def place_on_flattest(
         ConfigError: if the patch has no free disk.
     """
     ground = SpawnGround.of_map(config, heights, solids, patch)
+    ground = replace(ground, holes=holes[config.patch_cells(*patch)])
     # In single precision as in a map, so that an edit keeps the position.
     x, y = spawn_xy.astype(np.float32).tolist()
     origin = ground.nearest_flat((x, y))

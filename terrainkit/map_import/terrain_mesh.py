@@ -91,7 +91,8 @@ def import_terrain_mesh(
             )
     source = MeshSource(vertices=points, faces=triangles)
     check_samples(_SUBJECT, source, config.cell, math.prod(config.grid.shape))
-    return make_map(
+    imported: ImportedMap
+    *_, imported = make_map(
         _SUBJECT,
         source,
         config,
@@ -100,3 +101,4 @@ def import_terrain_mesh(
         starts[..., :2],
         types.astype(np.int32),
     )
+    return imported

@@ -11,7 +11,7 @@ from terrainkit.geometry.mesh.closed import closed_mesh
 from terrainkit.geometry.mesh.merged import merged_mesh
 from terrainkit.geometry.mesh.solid_mesh import solid_surfaces
 from terrainkit.geometry.solid_index import SolidIndex
-from terrainkit.geometry.triangle_tree import TriangleTree
+from terrainkit.geometry.triangle_tree import first_triangle
 from terrainkit.map.terrain_map import TerrainMap
 
 Floats = NDArray[np.float64]
@@ -90,7 +90,7 @@ class RayScene:
             normal = np.cross(b - a, c - a)
             plane = np.column_stack([normal, _dot(normal, a + shift)])
             self._planes[start : start + _PLANES_AT_ONCE] = plane
-        self._first = _first_triangle(vertices, triangles)
+        self._first = first_triangle(vertices, triangles)
 
     def first_hits(self, origins: Floats, directions: Floats, limit: float) -> Floats:
         """Return the distance at which each ray meets the ground or a solid [m].
@@ -126,24 +126,6 @@ class RayScene:
 
     def _to_cells(self, points: Floats) -> Floats:
         return np.asarray((points - self._origin) / self._map.grid.cell)
-
-
-def _first_triangle(vertices: Floats, triangles: NDArray[Any]) -> Any:
-    """Return `TriangleTree.first` of triangles, computed by embree where it is installed."""
-    try:
-        from embreex import mesh_construction, rtcore_scene
-    except ImportError:
-        return TriangleTree(vertices, triangles).first
-    scene = rtcore_scene.EmbreeScene(robust=True)
-    mesh_construction.TriangleMesh(scene, vertices, triangles)
-
-    def first(origins: Floats, directions: Floats, limit: float) -> Any:
-        limits = np.full(len(origins), min(limit, 1e30), np.float32)
-        starts, steps = origins.astype(np.float32), directions.astype(np.float32)
-        found = scene.run(starts, steps, limits, output=True)
-        return found["primID"], found["tfar"]
-
-    return first
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

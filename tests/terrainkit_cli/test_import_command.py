@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -21,7 +23,7 @@ def test_import_writes_map_and_report(terrainkit, rejected, tmp_path, bridge):
         "overhangs over 4.00 m2, of which 4.00 m2 are lost; largest error 1.200 m at ("
         in run.stdout
     )
-    assert ", apart from walls, which move by less than a cell" in run.stdout
+    assert re.search(r"compared with the file at \d+ points: all within 1 cm\n", run.stdout)
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.mode == "custom"
     run = terrainkit("check-map", "a.npz")
     assert run.returncode == 0, run.stdout
@@ -44,7 +46,10 @@ def test_import_fills_missing_heights(terrainkit, rejected, tmp_path):
     assert not (tmp_path / "a.npz").exists()
     run = terrainkit(*words)
     assert "warning: a.npy: 1 of 600 heights are missing" in run.stderr
-    assert "filled missing heights: 1\n" in run.stdout
+    assert (
+        "filled missing heights: 1; the map has ground over 0.01 m2 of 6.00 m2 where the file has "
+        "none\n" in run.stdout
+    )
 
 
 @pytest.mark.parametrize("name", ["bad.png", "bad.tif", "bad.npy", "bad.asc", "bad.stl", "bad.glb"])
@@ -83,9 +88,12 @@ def test_import_reports_what_is_lost(terrainkit, tmp_path):
     trimesh.util.concatenate(parts).export(tmp_path / "a.stl")
     lost = terrainkit("import", "a.stl", "-o", "a.npz").stdout
     assert (
-        "the map 0.00 m: parts narrower than a cell are lost, 10 faces (smaller --cell, or --solids"
-        in lost
+        "parts narrower than a cell are lost: 10 faces reach more than half a cell above the map "
+        "(smaller --cell, or --solids for closed bodies)\n" in lost
     )
     kept = terrainkit("import", "a.stl", "-o", "b.npz", "--solids").stdout
     assert "closed bodies narrower than a cell, now solids: 1" in kept
     assert "lost" not in kept
+    # A wall of 3 cm on 4 m.
+    found = re.search(r" points: (\S+)% within 1 cm; largest differences: 0\.500 m at ", lost)
+    assert float(found[1]) == pytest.approx(99.25, abs=0.5)

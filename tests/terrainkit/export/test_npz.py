@@ -316,7 +316,7 @@ def test_npz_invalid_parameters_are_rejected(good, bad, text):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}", '[{"max_error": "far"}]', "[" * 2000, '[{"lost_at": [1]}]']
+    "text", ["", "{}", '[{"max_error": "far"}]', "[" * 2000, '[{"max_error_at": [1]}]']
 )
 def test_npz_invalid_import_report_is_rejected(good, bad, text):
     repack(good, bad, {"import_reports": npy(text)})

@@ -36,9 +36,9 @@ DOUBT = r"^a\.stl is {} m: in millimeters\? --scale 0\.001 .*"
 @pytest.mark.parametrize(
     ("size", "samples", "is_metric", "kind", "message"),
     [
-        ((99.9, 50), MAX_SAMPLES, False, None, None),
-        ((101, 50), 5000, False, TerrainkitWarning, DOUBT.format("101 m x 50")),
-        ((101, 50), 4 * MAX_SAMPLES, True, None, None),
+        ((499, 50), MAX_SAMPLES, False, None, None),
+        ((501, 50), 5000, False, TerrainkitWarning, DOUBT.format("501 m x 50")),
+        ((501, 50), 4 * MAX_SAMPLES, True, None, None),
         ((9990, 50), 5000, True, None, None),
         ((99, 50), MAX_SAMPLES + 1, False, HeightFileError, DOUBT.format("99 m x 50")),
         (
