@@ -24,6 +24,8 @@ CellSides = Annotated[
     tuple[Size, ...], Meta(min_length=1, max_length=2, extra={"metavar": "X [Y]"})
 ]
 UpAxis = Literal["auto", "z", "y"]
+PointClass = Annotated[int, Meta(ge=0, le=255)]
+PointClasses = Annotated[tuple[PointClass, ...], Meta(min_length=1, extra={"alias": "--class"})]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +61,10 @@ class ReadOptions(Config):
 
     key: str = ""
     """Name of the array in an .npz file; empty: the only one with two axes."""
+
+    point_class: PointClasses | None = None
+    """Classes of the points of a .las or .laz file that are the ground; none: 2 where the file has
+    it, with a warning."""
 
     up: UpAxis = "auto"
     """Axis of a mesh or point cloud that points up; auto: y for glTF, what a .dae states, z for

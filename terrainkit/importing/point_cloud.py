@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError
+from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing.height_source import (
     Array,
     Source,
@@ -16,12 +16,16 @@ from terrainkit.importing.height_source import (
     cover_positions,
     decode,
     require,
+    warn,
     with_z_up,
 )
 from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
 from terrainkit.importing.raster import Raster
 
 SUFFIXES = (".xyz", ".pcd", ".las", ".laz")
+
+GROUND_CLASS = 2
+"""Class of the ground in LAS files, by the ASPRS."""
 
 MIN_CELL = 0.1
 """Smallest default cell [m]."""
@@ -88,7 +92,27 @@ def read(path: Path, options: ReadOptions) -> Source:
     """
     if (suffix := path.suffix.lower()) in (".las", ".laz"):
         require(path, "laspy", "las")
-    return make_point_source(path, decode(_READERS[suffix], path)["points"], options)
+    arrays = decode(_READERS[suffix], path)
+    points = arrays["points"]
+    if "classes" in arrays:
+        points = points[_is_ground(path, arrays["classes"], options)]
+    return make_point_source(path, points, options)
+
+
+def _is_ground(path: Path, classes: NDArray[Any], options: ReadOptions) -> NDArray[np.bool_]:
+    """Return whether each point is in one of the classes that are the ground."""
+    used = np.unique(classes)
+    wanted = options.point_class or ((GROUND_CLASS,) if GROUND_CLASS in used else used.tolist())
+    is_ground = np.isin(classes, wanted)
+    known = " ".join(map(str, used.tolist()))
+    if not is_ground.any():
+        raise ConfigError(f"class: got {wanted}; {path} has the classes {known}")
+    if not options.point_class and not is_ground.all():
+        warn(
+            f"{path}: only the {int(is_ground.sum())} of {len(classes)} points of class "
+            f"{GROUND_CLASS} (ground) are taken; --class {known} takes all"
+        )
+    return is_ground
 
 
 def make_point_source(path: Path, points: NDArray[Any], options: ReadOptions) -> Source:
@@ -164,7 +188,8 @@ def _read_pcd(path: Path) -> dict[str, Any]:
 def _read_las(path: Path) -> dict[str, Any]:
     import laspy
 
-    return {"points": np.asarray(laspy.read(path).xyz, float)}
+    cloud = laspy.read(path)
+    return {"points": np.asarray(cloud.xyz, float), "classes": np.asarray(cloud.classification)}
 
 
 _READERS = {".xyz": _read_xyz, ".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}

@@ -1,8 +1,10 @@
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import trimesh
 
-from terrainkit.errors import HeightFileError
+from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
 from terrainkit.importing import height_source as source_module
 from terrainkit.importing.height_source import open_source
 from terrainkit.importing.import_options import ReadOptions
@@ -94,3 +96,38 @@ def test_missing_modules_are_named_with_their_extra(tmp_path, monkeypatch, suffi
     (tmp_path / f"a{suffix}").write_bytes(b"0" * 8)
     with pytest.raises(HeightFileError, match=rf"files need {module}; run: pip install "):
         open_source(tmp_path / f"a{suffix}", ReadOptions())
+
+
+def save_las(path, classes):
+    laspy = pytest.importorskip("laspy")
+    cloud = laspy.create()
+    cloud.header.scales = [0.01, 0.01, 0.01]
+    cloud.x, cloud.y = np.arange(len(classes)), np.arange(len(classes)) ** 2
+    cloud.z = 10 * np.array(classes)
+    cloud.classification = classes
+    cloud.write(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("classes", "wanted", "expected"),
+    [
+        ([2, 5, 2, 6], None, [20, 20]),
+        ([2, 5, 2, 6], (5, 6, 9), [50, 60]),
+        ([1, 5, 1, 6], None, [10, 50, 10, 60]),
+        ([2, 2, 2], None, [20, 20, 20]),
+    ],
+)
+def test_las_has_the_points_of_its_ground(tmp_path, classes, wanted, expected):
+    path = save_las(tmp_path / "a.las", classes)
+    is_cut = wanted is None and len(expected) < len(classes)
+    message = r"the 2 of 4 points of class 2 \(ground\) are taken; --class 2 5 6 takes all"
+    with pytest.warns(TerrainkitWarning, match=message) if is_cut else nullcontext():
+        source = read(path, ReadOptions(point_class=wanted))
+    assert source.vertices[:, 2].tolist() == expected
+
+
+def test_las_without_the_class_is_rejected(tmp_path):
+    path = save_las(tmp_path / "a.las", [2, 5])
+    with pytest.raises(ConfigError, match=r"class: got \(9,\); .*a\.las has the classes 2 5$"):
+        read(path, ReadOptions(point_class=(9,)))
