@@ -22,7 +22,7 @@ from terrainkit.importing.height_source import (
 from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
 from terrainkit.importing.raster import Raster
 
-SUFFIXES = (".xyz", ".pcd", ".las", ".laz")
+SUFFIXES = (".pcd", ".las", ".laz")
 
 GROUND_CLASS = 2
 """Class of the ground in LAS files, by the ASPRS."""
@@ -156,15 +156,6 @@ def _make_raster(points: Array) -> Raster | None:
     return Raster(values=values, spacing=(cell, cell), lower=(x, y))
 
 
-def _read_xyz(path: Path) -> dict[str, Any]:
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first = file.readline()
-    delimiter = next((character for character in ",;" if character in first), None)
-    skip = int(not first.lstrip().startswith(tuple("+-.0123456789")))
-    columns: dict[str, Any] = {"usecols": (0, 1, 2), "ndmin": 2, "comments": ("#", "/")}
-    return {"points": np.loadtxt(path, delimiter=delimiter, skiprows=skip, **columns)}
-
-
 def _read_pcd(path: Path) -> dict[str, Any]:
     """Return the points of a file of PCL, whose header has lines such as FIELDS x y z."""
     head, _, rest = path.read_bytes().partition(b"\nDATA ")
@@ -192,4 +183,4 @@ def _read_las(path: Path) -> dict[str, Any]:
     return {"points": np.asarray(cloud.xyz, float), "classes": np.asarray(cloud.classification)}
 
 
-_READERS = {".xyz": _read_xyz, ".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}
+_READERS = {".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}

@@ -57,7 +57,7 @@ def test_pcd_has_its_points(tmp_path, kind, data):
         assert found.vertices.tolist() == [[2, 6, 14]]
 
 
-@pytest.mark.parametrize("text", ["1 2 3\n4,5", "a b", "", "1 2\n", "VERSION 7\nDATA ascii\n1 2 3"])
+@pytest.mark.parametrize("text", ["1 2 3\n4,5", "a b", "", "1 2\n", "VERSION 7\nDATA ascii\n1 2 a"])
 @pytest.mark.parametrize("suffix", ["xyz", "pcd"])
 def test_damaged_points_are_rejected(tmp_path, suffix, text):
     (tmp_path / f"a.{suffix}").write_text(text)
@@ -69,13 +69,13 @@ def test_xyz_on_a_regular_grid_is_a_raster(tmp_path):
     x, y = np.meshgrid(np.arange(4) * 0.5 + 100, np.arange(3) * 0.5, indexing="ij")
     rows = [f"{a},{b},{a - b},255\n" for a, b in zip(x.ravel(), y.ravel(), strict=True)]
     (tmp_path / "a.xyz").write_text("// X,Y,Z,R\n" + "".join(rows[:-1]))
-    source = read(tmp_path / "a.xyz", ReadOptions())
+    source = open_source(tmp_path / "a.xyz", ReadOptions())
     assert isinstance(source, Raster)
     assert (source.cell, source.lower) == (0.5, (99.75, -0.25))
     np.testing.assert_array_equal(np.isnan(source.values), np.arange(12).reshape(4, 3) == 11)
     assert source.values[3, 1] == 101.0
     (tmp_path / "b.xyz").write_text("".join([*rows[:8], rows[0]]))  # two points at one position
-    assert isinstance(read(tmp_path / "b.xyz", ReadOptions()), PointSource)
+    assert isinstance(open_source(tmp_path / "b.xyz", ReadOptions()), PointSource)
 
 
 def test_ply_without_faces_is_a_point_cloud(tmp_path):
