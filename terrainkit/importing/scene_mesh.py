@@ -93,6 +93,33 @@ def unit_shapes(level: int = 4) -> dict[str, tuple[Array, Faces]]:
     }
 
 
+def triangulate(points: Array, polygons: Faces) -> Faces:
+    """Return the triangles of polygons with one number of corners; those may be concave.
+
+    Args:
+        points: Points, shape (n, 3).
+        polygons: Indices of the corners, shape (number of polygons, number of corners).
+    """
+    import manifold3d
+
+    corners = points[polygons]
+    arms = corners - corners[:, :1]
+    fans = np.cross(arms[:, 1:-1], arms[:, 2:])
+    normals = fans.sum(axis=1)
+    is_concave = (np.einsum("pci,pi->pc", fans, normals) < 0).any(axis=1)
+    size = polygons.shape[1]
+    numbers = np.column_stack([np.zeros(size - 2, int), np.arange(1, size - 1), np.arange(2, size)])
+    found = [polygons[~is_concave][:, numbers].reshape(-1, 3)]
+    for k in np.flatnonzero(is_concave).tolist():
+        axis = int(np.abs(normals[k]).argmax())
+        flat = corners[k][:, [(axis + 1) % 3, (axis + 2) % 3]]
+        is_flipped = normals[k, axis] < 0
+        order = np.arange(size)[::-1] if is_flipped else np.arange(size)
+        inner = order[manifold3d.triangulate([flat[order]])]
+        found.append(polygons[k][inner[:, ::-1] if is_flipped else inner])
+    return np.concatenate(found).astype(np.int32)
+
+
 def _plane(point: Array, normal: Array, lower: Array, upper: Array) -> tuple[Array, Faces]:
     """Return the rectangle of a plane above the square from `lower` to `upper`."""
     if abs(normal[2]) < 0.1:

@@ -89,7 +89,8 @@ def test_ply_without_faces_is_a_point_cloud(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "module"), [(".las", "laspy"), (".LAZ", "laspy"), (".hgt", "rasterio")]
+    ("suffix", "module"),
+    [(".las", "laspy"), (".LAZ", "laspy"), (".hgt", "rasterio"), (".usd", "pxr")],
 )
 def test_missing_modules_are_named_with_their_extra(tmp_path, monkeypatch, suffix, module):
     monkeypatch.setattr(source_module, "is_installed", lambda _: False)
