@@ -1,6 +1,7 @@
 """Read the ground from a USD stage: its colliding shapes, or all visible ones if none collides."""
 
 import os
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -35,7 +36,15 @@ _SHAPES = {
 }
 """Unit shape of a type of prim."""
 
-_UNREAD = {"BasisCurves", "NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "Volume"}
+_UNREAD = {
+    "Points",
+    "BasisCurves",
+    "NurbsPatch",
+    "NurbsCurves",
+    "HermiteCurves",
+    "TetMesh",
+    "Volume",
+}
 """Types of shapes without triangles."""
 
 
@@ -86,8 +95,13 @@ def _read_stage(path: Path, up: str, scale: float | None) -> dict[str, Any]:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:  # its text begins with places in the code of USD
         raise ValueError(error.args[0].commentary) from None
-    if errors := stage.GetCompositionErrors():
-        raise ValueError(f"a part cannot be opened, and may be ground: {errors[0]}")
+    for error in map(str, stage.GetCompositionErrors()):
+        asset = re.search("asset @([^@]*)@", error)
+        if not (
+            asset and asset[1].endswith(".mtlx")
+        ):  # materials, for which usd-core has no plugin
+            text = asset[1] if asset else error
+            raise ValueError(f"a part cannot be opened, and may be ground: {text}")
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
     unit = scale or (UsdGeom.GetStageMetersPerUnit(stage) if has_unit else 1.0)
     axis = UsdGeom.GetStageUpAxis(stage).lower() if up == "auto" else up

@@ -122,6 +122,7 @@ def test_stage_leaves_out_what_is_no_ground(tmp_path, text, kept, warning):
     assert source.upper == pytest.approx((kept, 1.0))
 
 
+@pytest.mark.filterwarnings("ignore:.*shapes of type Points are left out")
 @pytest.mark.parametrize(("text", "message"), read_table(__file__, "rejected"))
 def test_stage_without_ground_is_rejected(tmp_path, text, message):
     with pytest.raises(HeightFileError, match=rf"a\.usda: .*{message}"):
