@@ -25,6 +25,24 @@ MAX_FILE_BYTES = 1 << 30
 """Largest file that is read [bytes]."""
 
 
+_CONVERTERS = {
+    "Blender (File > Export > glTF)": ".blend .fbx .abc",
+    "MeshLab (File > Export Mesh As, .ply)": ".3ds .wrl .vrml .x3d .off",
+    "FreeCAD (File > Export, .stl)": ".step .stp .iges .igs .brep .fcstd .dxf",
+    "ODA File Converter (to .dxf), then FreeCAD (File > Export, .stl)": ".dwg",
+    "IfcConvert (IfcConvert a.ifc a.glb)": ".ifc",
+    "Revit (File > Export > IFC), then IfcConvert (IfcConvert a.ifc a.glb)": ".rvt .rfa",
+    "the program that wrote it, to .glb, .obj or .stl": ".max .ma .mb .c4d .skp .3dm .sldprt",
+    "PDAL (pdal translate a.e57 a.laz) or CloudCompare": ".e57 .ptx .bpf",
+    "Autodesk ReCap (Export, .pts)": ".rcp .rcs",
+    "GDAL (gdal_translate a.nc a.tif)": ".nc .grd .flt .adf .vrt .jp2 .ter",
+    "GDAL (gdal_grid a.shp a.tif)": ".shp .geojson",
+    "octomap (octree2pointcloud a.bt a.pcd)": ".bt .ot",
+    "bag_to_pcd of pcl_ros": ".bag .mcap .db3",
+}
+"""Programs that convert what has no reader, and its suffixes."""
+
+
 class Source(Protocol):
     """The ground that a file describes."""
 
@@ -95,6 +113,11 @@ def open_source(path: Path, options: ReadOptions) -> Source:
         HeightFileError: if there is no reader for its suffix, or it cannot be read.
         ConfigError: if an option is missing or does not apply to the file.
     """
+    for converter, suffixes in _CONVERTERS.items():
+        if path.suffix.lower() in suffixes.split():
+            raise HeightFileError(
+                f"{path}: no reader for {path.suffix!r}; convert it with {converter}"
+            )
     reader = find_module(path, "terrainkit.importing", "reader", HeightFileError)
     check_file(path)
     source: Source = reader.read(path, options)
