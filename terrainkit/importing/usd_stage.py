@@ -95,12 +95,12 @@ def _read_stage(path: Path, up: str, scale: float | None) -> dict[str, Any]:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:  # its text begins with places in the code of USD
         raise ValueError(error.args[0].commentary) from None
-    for error in map(str, stage.GetCompositionErrors()):
-        asset = re.search("asset @([^@]*)@", error)
+    for problem in map(str, stage.GetCompositionErrors()):
+        asset = re.search("asset @([^@]*)@", problem)
         if not (
             asset and asset[1].endswith(".mtlx")
         ):  # materials, for which usd-core has no plugin
-            text = asset[1] if asset else error
+            text = asset[1] if asset else problem
             raise ValueError(f"a part cannot be opened, and may be ground: {text}")
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
     unit = scale or (UsdGeom.GetStageMetersPerUnit(stage) if has_unit else 1.0)
