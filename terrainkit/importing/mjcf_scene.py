@@ -1,4 +1,4 @@
-"""Read the ground from an MJCF scene: the geoms that are fixed to the world.
+"""Read the ground from an MJCF scene or a Gazebo world: the geoms that are fixed to the world.
 
 Unlike MuJoCo's rays, faces have every surface below each other, and closed bodies for solids.
 """
@@ -12,12 +12,13 @@ import numpy as np
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files.child_process import ProcessLimits
 from terrainkit.importing.height_source import Array, decode, warn
+from terrainkit.importing.image import read_pixels
 from terrainkit.importing.import_options import ReadOptions
-from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
-from terrainkit.importing.mjcf_text import read_text
+from terrainkit.importing.mesh_source import MeshSource, make_mesh_source, read_arrays
+from terrainkit.importing.mjcf_text import MjcfText, read_text
 from terrainkit.importing.scene_mesh import SceneMesh, unit_shapes
 
-SUFFIXES = (".xml",)
+SUFFIXES = (".xml", ".sdf", ".world")
 
 _BYTES_PER_STEP = 1 << 20
 """Size of files for which MuJoCo may take 10 s and a quarter of a gigabyte more."""
@@ -33,7 +34,7 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     geoms.
 
     Args:
-        path: The scene; MuJoCo opens the files that it refers to.
+        path: The scene, or a world or model of Gazebo; MuJoCo opens the files that it refers to.
         options: How to read the file.
 
     Warns:
@@ -45,22 +46,24 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     scene = read_text(path)
     steps = scene.num_bytes // _BYTES_PER_STEP
     limits = ProcessLimits(seconds=min(20.0 + 10 * steps, 120.0), memory=min(4 + steps, 32) << 28)
-    arrays = decode(_read_scene, path, scene.text, scene.models, limits=limits)
+    arrays = decode(_read_scene, path, scene, limits=limits)
     if not len(arrays["faces"]):
         raise HeightFileError(
-            f"{path}: got a scene without ground; expected geoms that collide in the world body"
+            f"{path}: got a scene without ground; expected geoms that collide in the world body, "
+            "or static models"
         )
     moving = [str(name) or "one without name" for name in arrays["moving"]]
     if moving:
-        warn(f"{path}: bodies with joints are left out: {listing(moving)}")
+        warn(f"{path}: bodies that move are left out: {listing(moving)}")
     return make_mesh_source(path, arrays, options)
 
 
-def _read_scene(_: Path, text: str, models: dict[str, bytes]) -> dict[str, Any]:
+def _read_scene(_: Path, scene: MjcfText) -> dict[str, Any]:
     import mujoco
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write MUJOCO_LOG.TXT
-    spec = mujoco.MjSpec.from_string(text, include=models or None)
+    spec = mujoco.MjSpec.from_string(scene.text, include=scene.models or None)
+    _read_files(spec, scene)
     world = spec.worldbody
 
     @cache
@@ -91,6 +94,27 @@ def _read_scene(_: Path, text: str, models: dict[str, bytes]) -> dict[str, Any]:
     mujoco.mj_kinematics(model, data)
     moving_names = np.array([body.name for body in moving], dtype=str)
     return {**_scene_mesh(model, data).arrays(), "moving": moving_names, "unit": 1.0}
+
+
+def _read_files(spec: Any, scene: MjcfText) -> None:
+    """Read the meshes and heightmaps of a Gazebo world, some of which MuJoCo cannot read."""
+    for name, file in scene.meshes.items():
+        arrays, mesh = read_arrays(file), spec.mesh(name)
+        mesh.uservert = (arrays["vertices"] * arrays.get("unit", 1.0)).ravel()
+        mesh.userface = arrays["faces"].ravel()
+    for name, file in scene.images.items():
+        pixels = read_pixels(file)["pixels"].astype(float)
+        if pixels.ndim > 2:
+            pixels = pixels[..., 2]  # Gazebo takes red
+        field, low, top = spec.hfield(name), pixels.min(), max(pixels.max(), 1.0)
+        # The largest value has the upper height; MuJoCo also has the smallest one at 0.
+        lift = field.size[2] * low / top
+        field.nrow, field.ncol = pixels.shape
+        field.userdata = pixels[::-1].ravel()
+        field.size[2] = max(field.size[2] - lift, 1e-6)
+        for geom in spec.geoms:
+            if geom.hfieldname == name:
+                geom.pos[2] += lift
 
 
 def _scene_mesh(model: Any, data: Any) -> SceneMesh:
