@@ -3,6 +3,7 @@
 Unlike MuJoCo's rays, faces have every surface below each other, and closed bodies for solids.
 """
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,11 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
             f"{path}: got a scene without ground; expected geoms that collide in the world body, "
             "or static models"
         )
-    moving = [str(name) or "one without name" for name in arrays["moving"]]
+    moving = [str(name) or "one without name" for name in [*scene.moving, *arrays["moving"]]]
     if moving:
         warn(f"{path}: bodies that move are left out: {listing(moving)}")
-    return make_mesh_source(path, arrays, options)
+    up = "z" if options.up == "auto" else options.up
+    return make_mesh_source(path, arrays, replace(options, up=up))
 
 
 def _read_scene(_: Path, scene: MjcfText) -> dict[str, Any]:

@@ -50,6 +50,9 @@ class MjcfText:
     images: dict[str, Path] = field(default_factory=dict)
     """Images of the heightmaps of a Gazebo world, by name."""
 
+    moving: list[str] = field(default_factory=list)
+    """Models of a Gazebo world that are left out."""
+
     num_bytes: int = 0
     """Size of the files that are read."""
 
@@ -83,6 +86,7 @@ class _Reader:
             sdf = SdfReader(self._parse)
             root = sdf.translate(root, path)
             self.scene.meshes, self.scene.images = sdf.meshes, sdf.images
+            self.scene.moving = sdf.moving
         if root.tag != "mujoco":
             raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco> or <sdf>")
         self._include(root, path, path.parent, parents)

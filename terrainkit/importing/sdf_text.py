@@ -1,6 +1,6 @@
 """Translate a Gazebo world or model (SDF) to MJCF, whose reader has its shapes.
 
-Models that are not static become bodies that move. Files of other places are never fetched.
+Models that are not static are left out. Files of other places are never fetched.
 """
 
 import os
@@ -46,6 +46,7 @@ class SdfReader:
         self._parse = parse
         self.meshes: dict[str, Path] = {}
         self.images: dict[str, Path] = {}
+        self.moving: list[str] = []
 
     def translate(self, root: Any, path: Path) -> Any:
         """Return the MJCF scene of a document, whose meshes and heightfields have names only.
@@ -89,9 +90,7 @@ class SdfReader:
                 for collision in child.findall("collision") if child.tag == "link" else ():
                     self._add_collision(link, collision, files[-1].parent)
         elif model.tag == "model":
-            body = etree.SubElement(parent, "body", name=model.get("name", ""))
-            etree.SubElement(body, "freejoint")
-            etree.SubElement(body, "geom", size="1")
+            self.moving.append(model.get("name", ""))
 
     def _include(self, parent: Any, include: Any, files: tuple[Path, ...], is_static: bool) -> None:
         uri, pose = include.findtext("uri", "").strip(), include.find("pose")
@@ -99,7 +98,7 @@ class SdfReader:
         if name == "ground_plane":
             body = etree.SubElement(parent, "body", _pose(pose))
             etree.SubElement(body, "geom", type="plane", size="50 50 1")
-        if name in ("ground_plane", "sun"):
+        if name == "ground_plane" or name.endswith("sun"):
             return
         path = find_file(uri, files[-1].parent)
         if path.is_dir():
@@ -161,6 +160,7 @@ def find_file(uri: str, folder: Path) -> Path:
         HeightFileError: if it is not on this computer.
     """
     scheme, _, name = uri.rpartition("://")
+    name = name if scheme in ("", "file") else name.lstrip("/")
     parents = [folder, *folder.absolute().parents[:_MAX_PARENTS]]
     folders = [place for parent in parents for place in (parent, parent / "models")]
     variables = [os.environ.get(name, "").split(os.pathsep) for name in _FOLDER_VARIABLES]

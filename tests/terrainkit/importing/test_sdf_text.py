@@ -47,7 +47,7 @@ def test_world_has_its_meshes(tmp_path, suffix):
     save(tmp_path, text, "models/step/model.sdf")
     include = "<include><uri>model://step</uri><name>{}</name><pose>{} 0 0 0 0 0</pose></include>"
     text = include.format("a", 0) + include.format("b", 5)
-    text += model(mesh.format("model://step/", 6), "0 5 0 0 0 0")
+    text += model(mesh.format("model:///step/", 6), "0 5 0 0 0 0")
     source = open_source(
         save(tmp_path, f"<world name='w'>{text}</world>", "worlds/a.world"), ReadOptions()
     )
