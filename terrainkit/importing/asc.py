@@ -47,7 +47,7 @@ def read(path: Path, options: ReadOptions) -> Source:
     Raises:
         HeightFileError: if the header or the number of heights is wrong.
     """
-    if not is_grid(path) and point_table.has_points(path):
+    if not is_grid(path) and point_table.has_points(path, is_named=False):
         return point_table.read(path, options)
     found = decode(_read_grid, path)
     dx, dy, x, y, nodata = found["header"].tolist()

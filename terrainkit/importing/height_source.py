@@ -18,6 +18,7 @@ from terrainkit.errors import HeightFileError, TerrainkitWarning, install_comman
 from terrainkit.files.child_process import ProcessError, ProcessLimits, run_in_process
 from terrainkit.files.suffix import find_module
 from terrainkit.importing.import_options import Missing, ReadOptions
+from terrainkit.settings.toml_text import parse_toml, read_text
 
 Array = NDArray[np.float64]
 
@@ -25,22 +26,8 @@ MAX_FILE_BYTES = 1 << 30
 """Largest file that is read [bytes]."""
 
 
-_CONVERTERS = {
-    "Blender (File > Export > glTF)": ".blend .fbx .abc",
-    "MeshLab (File > Export Mesh As, .ply)": ".3ds .wrl .vrml .x3d .off",
-    "FreeCAD (File > Export, .stl)": ".step .stp .iges .igs .brep .fcstd .dxf",
-    "ODA File Converter (to .dxf), then FreeCAD (File > Export, .stl)": ".dwg",
-    "IfcConvert (IfcConvert a.ifc a.glb)": ".ifc",
-    "Revit (File > Export > IFC), then IfcConvert (IfcConvert a.ifc a.glb)": ".rvt .rfa",
-    "the program that wrote it, to .glb, .obj or .stl": ".max .ma .mb .c4d .skp .3dm .sldprt",
-    "PDAL (pdal translate a.e57 a.laz) or CloudCompare": ".e57 .ptx .bpf",
-    "Autodesk ReCap (Export, .pts)": ".rcp .rcs",
-    "GDAL (gdal_translate a.nc a.tif)": ".nc .grd .flt .adf .vrt .jp2 .ter",
-    "GDAL (gdal_grid a.shp a.tif)": ".shp .geojson",
-    "octomap (octree2pointcloud a.bt a.pcd)": ".bt .ot",
-    "bag_to_pcd of pcl_ros": ".bag .mcap .db3",
-}
-"""Programs that convert what has no reader, and its suffixes."""
+_CONVERTERS = Path(__file__).with_name("converters.toml")
+"""The suffixes that programs convert, by the name of the program."""
 
 
 class Source(Protocol):
@@ -113,7 +100,7 @@ def open_source(path: Path, options: ReadOptions) -> Source:
         HeightFileError: if there is no reader for its suffix, or it cannot be read.
         ConfigError: if an option is missing or does not apply to the file.
     """
-    for converter, suffixes in _CONVERTERS.items():
+    for converter, suffixes in parse_toml(read_text(_CONVERTERS)).items():
         if path.suffix.lower() in suffixes.split():
             raise HeightFileError(
                 f"{path}: no reader for {path.suffix!r}; convert it with {converter}"

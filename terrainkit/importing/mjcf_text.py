@@ -13,7 +13,6 @@ from typing import Any
 
 from terrainkit.errors import HeightFileError, prefixed_errors
 from terrainkit.importing.height_source import MAX_FILE_BYTES, check_file
-from terrainkit.importing.sdf_text import SdfReader
 
 MAX_ELEMENTS = 100_000
 """Most elements, copies included; MuJoCo needs seconds for this many."""
@@ -67,7 +66,7 @@ def read_text(path: Path) -> MjcfText:
     with prefixed_errors(f"{path}: "):
         try:
             reader.scene.text, _ = reader.model(path, ())
-        except (SyntaxError, ValueError) as error:
+        except (SyntaxError, ValueError, RecursionError) as error:
             raise HeightFileError(f"cannot be read: {error}") from error
     return reader.scene
 
@@ -83,6 +82,8 @@ class _Reader:
 
         root = self._parse(path, parents)
         if root.tag == "sdf" and not parents:
+            from terrainkit.importing.sdf_text import SdfReader
+
             sdf = SdfReader(self._parse)
             root = sdf.translate(root, path)
             self.scene.meshes, self.scene.images = sdf.meshes, sdf.images

@@ -46,11 +46,8 @@ class _Layout(NamedTuple):
     delimiter: str | None
     """Delimiter; None for spaces."""
 
-    is_named: bool
-    """Whether a line names the columns."""
-
-    num_columns: int = 0
-    """Number of columns; 0 if no line begins with a number."""
+    num_columns: int
+    """Number of columns without names; 0 if a line names them or none begins with a number."""
 
 
 def read(path: Path, options: ReadOptions) -> Source:
@@ -64,15 +61,17 @@ def read(path: Path, options: ReadOptions) -> Source:
     return make_point_source(path, decode(_read_points, path)["points"], options)
 
 
-def has_named_points(path: Path) -> bool:
-    """Return whether one of the first lines names the columns x, y and z."""
-    return _find_layout(path).is_named
+def has_points(path: Path, *, is_named: bool) -> bool:
+    """Return whether the first lines name the columns, or have at least three numbers.
 
-
-def has_points(path: Path) -> bool:
-    """Return whether the first lines name the columns or have at least three numbers."""
+    Args:
+        path: The file.
+        is_named: Whether only names count.
+    """
     layout = _find_layout(path)
-    return layout.is_named or layout.num_columns >= 3
+    if layout.num_columns:
+        return layout.num_columns >= 3 and not is_named
+    return layout.start > 0
 
 
 def _find_layout(path: Path) -> _Layout:
@@ -84,24 +83,17 @@ def _find_layout(path: Path) -> _Layout:
         cells = [word.strip("\"' \t\r\n").replace(" ", "") for word in words]
         places = [[n for n, cell in enumerate(cells) if cell in names] for names in _NAMES]
         if all(places):
-            columns = [place[0] for place in places]
-            return _Layout(
-                k + 1, columns, delimiter or _delimiter("".join(lines[k + 1 : k + 3])), True
-            )
-        if len(cells) > 1 and _is_number(cells[0]) and not line.lstrip().startswith(_COMMENTS):
-            return _Layout(k, [0, 1, 2], delimiter, False, len(cells))
-    return _Layout(0, [0, 1, 2], None, False)
+            delimiter = delimiter or _delimiter("".join(lines[k + 1 : k + 3]))
+            return _Layout(k + 1, [place[0] for place in places], delimiter, 0)
+        if len(cells) > 1 and not line.lstrip().startswith(_COMMENTS):
+            with suppress(ValueError):
+                float(cells[0])
+                return _Layout(k, [0, 1, 2], delimiter, len(cells))
+    return _Layout(0, [0, 1, 2], None, 0)
 
 
 def _delimiter(text: str) -> str | None:
     return next((mark for mark in ",;\t" if mark in text), None)
-
-
-def _is_number(text: str) -> bool:
-    with suppress(ValueError):
-        float(text)
-        return True
-    return False
 
 
 def _read_points(path: Path) -> dict[str, Any]:

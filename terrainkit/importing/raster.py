@@ -214,21 +214,14 @@ def _warn_of_range(path: Path, values: Array, most: int, low: float, high: float
     bottom, top = float(known.min(initial=most)), float(known.max(initial=0.0))
     if not bottom < top or (bottom == 0 and top >= _FULL_RANGE * most):
         return
-    step = (high - low) / (top - bottom)
-    ranges = [
-        f"In MuJoCo, the smallest and the largest value of the image have these heights: "
-        f"--height-range {low - step * bottom:.6g} {low + step * (most - bottom):.6g}"
-    ]
-    if bottom == 0:
-        ranges[0] = ranges[0].replace("In MuJoCo", "In MuJoCo and Gazebo")
-    elif top < most:
-        ranges.append(
-            f"In Gazebo, the largest value has the upper height: "
-            f"--height-range {low:g} {low + (high - low) * most / top:.6g}"
-        )
+    step, largest = (high - low) / (top - bottom), low + (high - low) * most / top
+    text = f"--height-range {low - step * bottom:.6g} {low + step * (most - bottom):.6g}"
+    if bottom > 0 and top < most:
+        text += f"; in Gazebo, only the largest one has: --height-range {low:g} {largest:.6g}"
+    simulators = "MuJoCo" if bottom > 0 else "MuJoCo and Gazebo"
     warn(
-        f"{path}: got values from {bottom:g} to {top:g}; --height-range is for 0 and {most}. "
-        + ". ".join(ranges)
+        f"{path}: got values from {bottom:g} to {top:g}; --height-range is for 0 and {most}. In "
+        f"{simulators}, the smallest and the largest value of the image have these heights: {text}"
     )
 
 

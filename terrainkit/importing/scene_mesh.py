@@ -102,8 +102,7 @@ def triangulate(points: Array, polygons: Faces) -> Faces:
     """
     import manifold3d
 
-    corners = points[polygons]
-    arms = corners - corners[:, :1]
+    arms = points[polygons] - points[polygons[:, :1]]
     fans = np.cross(arms[:, 1:-1], arms[:, 2:])
     normals = fans.sum(axis=1)
     is_concave = (np.einsum("pci,pi->pc", fans, normals) < 0).any(axis=1)
@@ -111,12 +110,9 @@ def triangulate(points: Array, polygons: Faces) -> Faces:
     numbers = np.column_stack([np.zeros(size - 2, int), np.arange(1, size - 1), np.arange(2, size)])
     found = [polygons[~is_concave][:, numbers].reshape(-1, 3)]
     for k in np.flatnonzero(is_concave).tolist():
-        axis = int(np.abs(normals[k]).argmax())
-        flat = corners[k][:, [(axis + 1) % 3, (axis + 2) % 3]]
-        is_flipped = normals[k, axis] < 0
-        order = np.arange(size)[::-1] if is_flipped else np.arange(size)
-        inner = order[manifold3d.triangulate([flat[order]])]
-        found.append(polygons[k][inner[:, ::-1] if is_flipped else inner])
+        side = arms[k, 1]
+        flat = arms[k] @ np.column_stack([side, np.cross(normals[k], side)])
+        found.append(polygons[k][manifold3d.triangulate([flat])])
     return np.concatenate(found).astype(np.int32)
 
 

@@ -86,9 +86,10 @@ class SdfReader:
             body = etree.SubElement(parent, "body", _pose(pose))
             for child in model:
                 self._add_model(body, child, files, True, child.find("pose"))
-                link = etree.SubElement(body, "body", _pose(child.find("pose")))
-                for collision in child.findall("collision") if child.tag == "link" else ():
-                    self._add_collision(link, collision, files[-1].parent)
+            for link in model.findall("link"):
+                frame = etree.SubElement(body, "frame", _pose(link.find("pose")))
+                for collision in link.findall("collision"):
+                    self._add_collision(frame, collision, files[-1].parent)
         elif model.tag == "model":
             self.moving.append(model.get("name", ""))
 
@@ -130,23 +131,23 @@ class SdfReader:
         """Add the file of a mesh or a heightmap."""
         file = find_file(shape.findtext("uri", "").strip(), folder)
         check_file(file)
-        name = f"asset_{len(self._assets)}"
         if shape.tag == "mesh":
             if shape.find("submesh") is not None:
                 raise HeightFileError(f"got a submesh of {file.name}; expected whole meshes")
-            etree.SubElement(
-                self._assets, "mesh", name=name, scale=shape.findtext("scale", "1 1 1")
-            )
+            scale = shape.findtext("scale", "1 1 1")
+            name = f"{file} {scale}"
+            if name not in self.meshes:
+                etree.SubElement(self._assets, "mesh", name=name, scale=scale)
             self.meshes[name] = file
             geom.set("mesh", name)
-            return
-        if file.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        elif file.suffix.lower() in (".png", ".jpg", ".jpeg"):
+            name, sides = f"{file} {len(self.images)}", _numbers(shape, "size") * [0.5, 0.5, 1]
+            etree.SubElement(self._assets, "hfield", name=name, size=f"{_text(sides)} 1e-3")
+            self.images[name] = file
+            geom.set("hfield", name)
+            geom.set("pos", shape.findtext("pos", "0 0 0"))
+        else:
             raise HeightFileError(f"got the heightmap {file.name}; import it on its own")
-        x, y, z = _numbers(shape, "size")
-        etree.SubElement(self._assets, "hfield", name=name, size=_text([x / 2, y / 2, z, 1e-3]))
-        self.images[name] = file
-        geom.set("hfield", name)
-        geom.set("pos", shape.findtext("pos", "0 0 0"))
 
 
 def find_file(uri: str, folder: Path) -> Path:
@@ -163,11 +164,10 @@ def find_file(uri: str, folder: Path) -> Path:
     name = name if scheme in ("", "file") else name.lstrip("/")
     parents = [folder, *folder.absolute().parents[:_MAX_PARENTS]]
     folders = [place for parent in parents for place in (parent, parent / "models")]
-    variables = [os.environ.get(name, "").split(os.pathsep) for name in _FOLDER_VARIABLES]
-    folders += [Path(place) for places in variables for place in places if place]
-    if scheme in ("http", "https"):
-        folders = []
-    for place in folders if scheme in ("model", "package") else folders[:1]:
+    listed = os.pathsep.join(os.environ.get(variable, "") for variable in _FOLDER_VARIABLES)
+    folders += map(Path, filter(None, listed.split(os.pathsep)))
+    places = {"model": folders, "package": folders, "": [folder], "file": [folder]}
+    for place in places.get(scheme, ()):
         if name and (place / name).exists():
             return place / name
     raise HeightFileError(

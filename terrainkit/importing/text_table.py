@@ -45,7 +45,7 @@ def read(path: Path, options: ReadOptions) -> Source:
     """
     if asc.is_grid(path):
         return asc.read(path, options)
-    if point_table.has_named_points(path):
+    if point_table.has_points(path, is_named=True):
         return point_table.read(path, options)
     return make_raster(path, decode(_read_table, path)["heights"], options)
 

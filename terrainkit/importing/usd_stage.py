@@ -4,9 +4,9 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,37 +15,16 @@ from terrainkit.files import sandbox
 from terrainkit.importing.height_source import Array, decode, require, warn, with_z_up
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
-from terrainkit.importing.scene_mesh import MAX_VERTICES, Faces, SceneMesh, triangulate, unit_shapes
+from terrainkit.importing.scene_mesh import Faces, SceneMesh, triangulate, unit_shapes
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 _AXES = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
 """Columns of a shape along z whose axis is another one."""
 
-_SHAPES = {
-    "Mesh": "",
-    "PointInstancer": "",
-    "Plane": "",
-    "Cube": "box",
-    "Sphere": "sphere",
-    "Capsule": "sphere",
-    "Capsule_1": "sphere",
-    "Cylinder": "cylinder",
-    "Cylinder_1": "cylinder",
-    "Cone": "cylinder",
-}
-"""Unit shape of a type of prim."""
-
-_UNREAD = {
-    "Points",
-    "BasisCurves",
-    "NurbsPatch",
-    "NurbsCurves",
-    "HermiteCurves",
-    "TetMesh",
-    "Volume",
-}
-"""Types of shapes without triangles."""
+_SOLIDS = {"Cube": "box", "Sphere": "sphere", "Capsule": "sphere"}
+_SOLIDS |= {"Cylinder": "cylinder", "Cone": "cylinder"}
+"""Unit shape of a type of prim; Capsule_1 and Cylinder_1 have two radii."""
 
 
 def read(path: Path, options: ReadOptions) -> MeshSource:
@@ -74,8 +53,7 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     return make_mesh_source(path, arrays, replace(options, up="z", scale=None))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Shape:
+class _Shape(NamedTuple):
     prim: Any
 
     placements: Array
@@ -97,11 +75,9 @@ def _read_stage(path: Path, up: str, scale: float | None) -> dict[str, Any]:
         raise ValueError(error.args[0].commentary) from None
     for problem in map(str, stage.GetCompositionErrors()):
         asset = re.search("asset @([^@]*)@", problem)
-        if not (
-            asset and asset[1].endswith(".mtlx")
-        ):  # materials, for which usd-core has no plugin
-            text = asset[1] if asset else problem
-            raise ValueError(f"a part cannot be opened, and may be ground: {text}")
+        name = asset[1] if asset else problem
+        if not name.endswith(".mtlx"):  # materials, for which usd-core has no plugin
+            raise ValueError(f"a part cannot be opened, and may be ground: {name}")
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
     unit = scale or (UsdGeom.GetStageMetersPerUnit(stage) if has_unit else 1.0)
     axis = UsdGeom.GetStageUpAxis(stage).lower() if up == "auto" else up
@@ -140,15 +116,18 @@ def _find_shapes(root: Any, placements: Array, left_out: dict[str, list[Any]]) -
     colliding = set()
     prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(predicate)))
     for prim in prims:
-        path, kind = prim.GetPath(), prim.GetTypeName()
-        if _moves(prim):
+        path, kind = prim.GetPath(), prim.GetTypeName().removesuffix("_1")
+        if prim.HasAPI(UsdPhysics.RigidBodyAPI) and (
+            _value(prim, "physics:rigidBodyEnabled", True)
+            and not _value(prim, "physics:kinematicEnabled", False)
+        ):
             left_out["bodies that move"].append(path)
             prims.PruneChildren()
             continue
         is_collider = path.GetParentPath() in colliding or prim.HasAPI(UsdPhysics.CollisionAPI)
         if is_collider and _value(prim, "physics:collisionEnabled", True):
             colliding.add(path)
-        if kind not in _SHAPES and kind not in _UNREAD:
+        if not prim.IsA(UsdGeom.Gprim) and kind != "PointInstancer":
             continue
         image = UsdGeom.Imageable(prim)
         is_visible = image.ComputePurpose() in ("default", "render") and (
@@ -159,15 +138,10 @@ def _find_shapes(root: Any, placements: Array, left_out: dict[str, list[Any]]) -
             prims.PruneChildren()
             for prototype, copies in _copies(prim, inner):
                 for shape in _find_shapes(prototype, copies, left_out):
-                    yield replace(
-                        shape,
-                        collides=shape.collides or path in colliding,
-                        is_visible=shape.is_visible and is_visible,
-                    )
-        elif kind in _SHAPES:
-            yield _Shape(
-                prim=prim, placements=inner, collides=path in colliding, is_visible=is_visible
-            )
+                    collides, is_drawn = shape.collides or path in colliding, shape.is_visible
+                    yield shape._replace(collides=collides, is_visible=is_drawn and is_visible)
+        elif kind in (*_SOLIDS, "Mesh", "Plane"):
+            yield _Shape(prim, inner, path in colliding, is_visible)
         elif is_visible:
             left_out[f"shapes of type {kind}"].append(path)
 
@@ -181,23 +155,12 @@ def _value(prim: Any, name: str, default: Any) -> Any:
     return default if value is None else value
 
 
-def _moves(prim: Any) -> bool:
-    from pxr import UsdPhysics
-
-    is_body = prim.HasAPI(UsdPhysics.RigidBodyAPI) and _value(
-        prim, "physics:rigidBodyEnabled", True
-    )
-    return bool(is_body and not _value(prim, "physics:kinematicEnabled", False))
-
-
 def _copies(prim: Any, placements: Array) -> Iterator[tuple[Any, Array]]:
     """Yield each prototype of a point instancer, and the transforms of its copies to the world."""
     from pxr import Usd, UsdGeom
 
     instancer, time = UsdGeom.PointInstancer(prim), Usd.TimeCode.EarliestTime()
     copies = np.array(instancer.ComputeInstanceTransformsAtTime(time, time)).reshape(-1, 4, 4)
-    if len(copies) * len(placements) > MAX_VERTICES:
-        raise ValueError(f"got more than {MAX_VERTICES} copies")
     numbers = np.array(instancer.GetProtoIndicesAttr().Get(time), dtype=int)
     mask = np.array(instancer.ComputeMaskAtTime(time), dtype=bool)
     numbers = numbers[mask] if len(mask) else numbers
@@ -216,8 +179,6 @@ def _add_shape(scene: SceneMesh, shape: _Shape) -> None:
             scene.add_plane(placement[3, :3], normal, size * np.abs(placement[:3, :3]).max())
         return
     vertices, faces = _mesh(prim) if prim.GetTypeName() == "Mesh" else _solid(prim)
-    if len(vertices) * len(shape.placements) > MAX_VERTICES:
-        raise ValueError(f"got copies of {prim.GetPath()} with more than {MAX_VERTICES} vertices")
     for placement in shape.placements:
         is_mirrored = np.linalg.det(placement[:3, :3]) < 0
         placed = vertices @ placement[:3, :3] + placement[3, :3]
@@ -226,8 +187,8 @@ def _add_shape(scene: SceneMesh, shape: _Shape) -> None:
 
 def _solid(prim: Any) -> tuple[Array, Faces]:
     """Return the vertices and faces of a cube, a sphere, a capsule, a cylinder or a cone."""
-    kind = prim.GetTypeName()
-    vertices, faces = unit_shapes()[_SHAPES[kind]]
+    kind = prim.GetTypeName().removesuffix("_1")
+    vertices, faces = unit_shapes()[_SOLIDS[kind]]
     if kind == "Cube":
         return vertices * _value(prim, "size", 2.0) / 2, faces
     radius, height = _value(prim, "radius", 1.0), _value(prim, "height", 2.0)
@@ -235,12 +196,9 @@ def _solid(prim: Any) -> tuple[Array, Faces]:
     top = 0.0 if kind == "Cone" else _value(prim, "radiusTop", radius)
     side = np.sign(vertices[:, 2].round(9))
     radii = (bottom + top + side * (top - bottom)) / 2
-    if _SHAPES[kind] == "cylinder":
-        vertices = vertices * np.column_stack([radii, radii, np.full(len(radii), height / 2)])
-    else:
-        vertices = vertices * radii[:, None]
-        if kind != "Sphere":
-            vertices[:, 2] += side * height / 2
+    along = vertices[:, 2] * radii if _SOLIDS[kind] == "sphere" else 0.0
+    along = along + (0.0 if kind == "Sphere" else side * height / 2)
+    vertices = np.column_stack([vertices[:, :2] * radii[:, None], along])
     return vertices[:, _AXES[_value(prim, "axis", "Z")]], faces
 
 

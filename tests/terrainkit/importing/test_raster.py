@@ -69,7 +69,7 @@ def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
         (
             128,
             168,
-            r"MuJoCo, .* --height-range -5.4 7.35\. In Gazebo, .* --height-range 1 4.03571$",
+            r"MuJoCo, .* --height-range -5.4 7.35; in Gazebo, .* --height-range 1 4.03571$",
         ),
         (128, 255, r"In MuJoCo, .* --height-range -1.01575 3$"),
     ],

@@ -97,3 +97,9 @@ def test_world_that_cannot_be_read_is_rejected(tmp_path, text, message):
     save(tmp_path, "<model name='m'><include><uri>loop.sdf</uri></include></model>", "loop.sdf")
     with pytest.raises(HeightFileError, match=rf"a\.world: .*{message}"):
         open_source(save(tmp_path, text), ReadOptions())
+
+
+def test_world_of_many_nested_models_is_rejected(tmp_path):
+    text = "<model name='m'>" * 2000 + "</model>" * 2000
+    with pytest.raises(HeightFileError, match=r"a\.world: .*cannot be read"):
+        open_source(save(tmp_path, text), ReadOptions())

@@ -6,6 +6,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
+from terrainkit.importing import scene_mesh
 from terrainkit.importing.height_source import open_source
 from terrainkit.importing.import_options import ReadOptions
 from tests.tables import read_table
@@ -129,11 +130,12 @@ def test_stage_without_ground_is_rejected(tmp_path, text, message):
         open_source(save(tmp_path, METERS + text), ReadOptions())
 
 
-def test_stage_of_many_copies_is_rejected(tmp_path):
+def test_stage_of_many_copies_is_rejected(tmp_path, monkeypatch):
+    monkeypatch.setattr(scene_mesh, "MAX_VERTICES", 3000 * 642 - 1)
     text = 'def PointInstancer "p" {{ rel prototypes = </p/s>\nint[] protoIndices = [{}]\n'
     text += 'point3f[] positions = [{}]\ndef Sphere "s" {{}} }}'
-    path = save(tmp_path, METERS + text.format("0," * 30_000, "(0,0,0)," * 30_000))
-    with pytest.raises(HeightFileError, match="copies of /p/s with more than 50000000 vertices"):
+    path = save(tmp_path, METERS + text.format("0," * 3000, "(0,0,0)," * 3000))
+    with pytest.raises(HeightFileError, match="a scene of more than 1925999 vertices, copies incl"):
         open_source(path, ReadOptions())
 
 
