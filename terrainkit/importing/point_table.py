@@ -83,7 +83,7 @@ def _find_layout(path: Path) -> _Layout:
         cells = [word.strip("\"' \t\r\n").replace(" ", "") for word in words]
         places = [[n for n, cell in enumerate(cells) if cell in names] for names in _NAMES]
         if all(places):
-            delimiter = delimiter or _delimiter("".join(lines[k + 1 : k + 3]))
+            delimiter = _delimiter("".join(lines[k + 1 : k + 3]))
             return _Layout(k + 1, [place[0] for place in places], delimiter, 0)
         if len(cells) > 1 and not line.lstrip().startswith(_COMMENTS):
             with suppress(ValueError):
