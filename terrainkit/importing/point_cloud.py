@@ -1,6 +1,7 @@
 """Read the ground from a point cloud."""
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,12 @@ SUFFIXES = (".pcd", ".las", ".laz")
 
 GROUND_CLASS = 2
 """Class of the ground in LAS files, by the ASPRS."""
+
+_LENGTH_UNIT = 3076
+"""GeoTIFF key of the unit of lengths."""
+
+_FEET = (9002, 9003)
+"""Its values for feet and US survey feet."""
 
 MIN_CELL = 0.1
 """Smallest default cell [m]."""
@@ -95,6 +102,8 @@ def read(path: Path, options: ReadOptions) -> Source:
     arrays = decode(_READERS[suffix], path)
     points = arrays["points"]
     if "classes" in arrays:
+        if arrays["is_feet"] and not options.scale:
+            warn(f"{path}: states feet, which are taken as meters; --scale 0.3048 converts them")
         points = points[_is_ground(path, arrays["classes"], options)]
     return make_point_source(path, points, options)
 
@@ -180,7 +189,13 @@ def _read_las(path: Path) -> dict[str, Any]:
     import laspy
 
     cloud = laspy.read(path)
-    return {"points": np.asarray(cloud.xyz, float), "classes": np.asarray(cloud.classification)}
+    records = cloud.header.vlrs
+    keys = [key for record in records for key in getattr(record, "geo_keys", ())]
+    is_feet = any(key.id == _LENGTH_UNIT and key.value_offset in _FEET for key in keys)
+    texts = [getattr(record, "string", "") for record in records]
+    is_feet |= any(re.search('UNIT\\["[^"]*(foot|feet|ft)', text, re.IGNORECASE) for text in texts)
+    classes = np.asarray(cloud.classification)
+    return {"points": np.asarray(cloud.xyz, float), "classes": classes, "is_feet": is_feet}
 
 
 _READERS = {".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}

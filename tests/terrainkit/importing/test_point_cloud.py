@@ -99,13 +99,14 @@ def test_missing_modules_are_named_with_their_extra(tmp_path, monkeypatch, suffi
         open_source(tmp_path / f"a{suffix}", ReadOptions())
 
 
-def save_las(path, classes):
+def save_las(path, classes, records=()):
     laspy = pytest.importorskip("laspy")
     cloud = laspy.create()
     cloud.header.scales = [0.01, 0.01, 0.01]
     cloud.x, cloud.y = np.arange(len(classes)), np.arange(len(classes)) ** 2
     cloud.z = 10 * np.array(classes)
     cloud.classification = classes
+    cloud.header.vlrs.extend(records)
     cloud.write(path)
     return path
 
@@ -132,3 +133,22 @@ def test_las_without_the_class_is_rejected(tmp_path):
     path = save_las(tmp_path / "a.las", [2, 5])
     with pytest.raises(ConfigError, match=r"class: got \(9,\); .*a\.las has the classes 2 5$"):
         read(path, ReadOptions(point_class=(9,)))
+
+
+@pytest.mark.parametrize(
+    ("number", "data", "is_feet"),
+    [
+        (34735, np.array([1, 1, 0, 1, 3076, 0, 1, 9003], "<u2").tobytes(), True),
+        (34735, np.array([1, 1, 0, 1, 3076, 0, 1, 9001], "<u2").tobytes(), False),
+        (2112, b'PROJCS["a",UNIT["US survey foot",0.3048006]]\0', True),
+        (2112, b'PROJCS["a",UNIT["metre",1]]\0', False),
+    ],
+)
+def test_las_in_feet_is_warned_of(tmp_path, number, data, is_feet):
+    laspy = pytest.importorskip("laspy")
+    record = laspy.VLR("LASF_Projection", number, record_data=data)
+    path = save_las(tmp_path / "a.las", [2, 2, 2], [record])
+    message = "states feet, which are taken as meters; --scale 0.3048 converts them$"
+    with pytest.warns(TerrainkitWarning, match=message) if is_feet else nullcontext():
+        assert read(path, ReadOptions()).upper == (2.0, 4.0)
+    assert read(path, ReadOptions(scale=0.5)).upper == (1.0, 2.0)
