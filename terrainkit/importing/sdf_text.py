@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lxml import etree
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, prefixed_errors
@@ -43,7 +42,10 @@ class SdfReader:
         Args:
             parse: Returns the root of a document; its second argument are the documents around it.
         """
+        from lxml.etree import SubElement
+
         self._parse = parse
+        self._add = SubElement
         self.meshes: dict[str, Path] = {}
         self.images: dict[str, Path] = {}
         self.moving: list[str] = []
@@ -54,10 +56,12 @@ class SdfReader:
         Raises:
             HeightFileError: if an included model or a file is missing, or not supported.
         """
-        scene = etree.Element("mujoco")
-        etree.SubElement(scene, "compiler", angle="radian", eulerseq="XYZ")
-        self._assets = etree.SubElement(scene, "asset")
-        world = etree.SubElement(scene, "worldbody")
+        from lxml.etree import Element
+
+        scene = Element("mujoco")
+        self._add(scene, "compiler", angle="radian", eulerseq="XYZ")
+        self._assets = self._add(scene, "asset")
+        world = self._add(scene, "worldbody")
         for part in root:
             # A model on its own is ground unless it has joints.
             is_static = part.tag == "model" and part.find("joint") is None
@@ -83,11 +87,11 @@ class SdfReader:
         if model.tag == "include":
             self._include(parent, model, files, is_static)
         elif model.tag == "model" and is_static:
-            body = etree.SubElement(parent, "body", _pose(pose))
+            body = self._add(parent, "body", _pose(pose))
             for child in model:
                 self._add_model(body, child, files, True, child.find("pose"))
             for link in model.findall("link"):
-                frame = etree.SubElement(body, "frame", _pose(link.find("pose")))
+                frame = self._add(body, "frame", _pose(link.find("pose")))
                 for collision in link.findall("collision"):
                     self._add_collision(frame, collision, files[-1].parent)
         elif model.tag == "model":
@@ -97,8 +101,8 @@ class SdfReader:
         uri, pose = include.findtext("uri", "").strip(), include.find("pose")
         name = uri.rstrip("/").rpartition("/")[2].lower().replace(" ", "_")
         if name == "ground_plane":
-            body = etree.SubElement(parent, "body", _pose(pose))
-            etree.SubElement(body, "geom", type="plane", size="50 50 1")
+            body = self._add(parent, "body", _pose(pose))
+            self._add(body, "geom", type="plane", size="50 50 1")
         if name == "ground_plane" or name.endswith("sun"):
             return
         path = find_file(uri, files[-1].parent)
@@ -117,11 +121,11 @@ class SdfReader:
                 continue
             if shape.tag not in _SIZES:
                 raise HeightFileError(f"got a <{shape.tag}>; expected {', '.join(_SIZES)}")
-            frame = etree.SubElement(parent, "frame", _pose(collision.find("pose")))
+            frame = self._add(parent, "frame", _pose(collision.find("pose")))
             parts = _SIZES[shape.tag].items()
             size = np.concatenate([*(share * _numbers(shape, name) for name, share in parts), [1]])
             kind = shape.tag.replace("heightmap", "hfield")
-            geom = etree.SubElement(frame, "geom", type=kind, size=_text(size[:3]))
+            geom = self._add(frame, "geom", type=kind, size=_text(size[:3]))
             if shape.tag == "plane":
                 geom.set("zaxis", shape.findtext("normal", "0 0 1"))
             elif shape.tag in ("mesh", "heightmap"):
@@ -137,12 +141,12 @@ class SdfReader:
             scale = shape.findtext("scale", "1 1 1")
             name = f"{file} {scale}"
             if name not in self.meshes:
-                etree.SubElement(self._assets, "mesh", name=name, scale=scale)
+                self._add(self._assets, "mesh", name=name, scale=scale)
             self.meshes[name] = file
             geom.set("mesh", name)
         elif file.suffix.lower() in (".png", ".jpg", ".jpeg"):
             name, sides = f"{file} {len(self.images)}", _numbers(shape, "size") * [0.5, 0.5, 1]
-            etree.SubElement(self._assets, "hfield", name=name, size=f"{_text(sides)} 1e-3")
+            self._add(self._assets, "hfield", name=name, size=f"{_text(sides)} 1e-3")
             self.images[name] = file
             geom.set("hfield", name)
             geom.set("pos", shape.findtext("pos", "0 0 0"))
