@@ -88,6 +88,8 @@ class _Reader:
             root = sdf.translate(root, path)
             self.scene.meshes, self.scene.images = sdf.meshes, sdf.images
             self.scene.moving = sdf.moving
+            files = {*sdf.meshes.values(), *sdf.images.values()}
+            self.scene.num_bytes += sum(file.stat().st_size for file in files)
         if root.tag != "mujoco":
             raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco> or <sdf>")
         self._include(root, path, path.parent, parents)

@@ -184,8 +184,9 @@ def _pose(pose: Any) -> dict[str, str]:
     """Return the attributes of a body with the pose of an element, which may be None or empty."""
     if pose is None or not (pose.text or "").strip():
         return {}
-    if pose.get("relative_to", "world") not in ("", "world", "__model__"):
-        raise HeightFileError(f"got a pose relative to {pose.get('relative_to')}; expected none")
+    frame = pose.get("relative_to", pose.get("frame", ""))  # older versions have `frame`
+    if frame not in ("", "world", "__model__"):
+        raise HeightFileError(f"got a pose relative to {frame}; expected one without")
     values = np.array(pose.text.split(), dtype=float)
     if pose.get("rotation_format") == "quat_xyzw":
         return {"pos": _text(values[:3]), "quat": _text(values[[6, 3, 4, 5]])}
