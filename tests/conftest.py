@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.files import child_process
+from terrainkit.files import child_process, sandbox
 from terrainkit.files.child_process import ProcessLimits
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
 from terrainkit.terrain import plugin_file, registry
@@ -190,6 +190,7 @@ class ProcessStandIn:
 def import_in_process(monkeypatch):
     """Read files in this process: trimesh takes most of a second to import."""
     monkeypatch.setattr(child_process, "ChildProcess", ProcessStandIn)
+    monkeypatch.setattr(sandbox, "forbid_changes", lambda: True)  # for good
     yield
     if "mujoco" in sys.modules:  # the child process does not restore it
         sys.modules["mujoco"].set_mju_user_warning(None)

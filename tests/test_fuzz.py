@@ -237,7 +237,7 @@ def test_every_suffix_of_import_has_a_seed(surfaces):
     modules = iter_modules(importing.__path__, f"{importing.__name__}.")
     readers = [import_module(module.name) for module in modules]
     suffixes = {suffix for reader in readers for suffix in getattr(reader, "SUFFIXES", ())}
-    same_reader = {".jpeg", ".dt1", ".dt2"}
+    same_reader = {".jpeg", ".dt1", ".dt2", ".xyzn", ".xyzrgb", ".usd", ".usdz", ".sdf"}
     assert suffixes - tried == same_reader
 
 

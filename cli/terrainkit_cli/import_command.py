@@ -38,8 +38,9 @@ class Import(ConfigCommand):
 
     files: Annotated[tuple[Path, ...], positional("FILE...")]
     """Image (.png with 16 bits, .tif), array (.npy, .npz), table (.txt, .csv), ASCII grid (.asc),
-    geodata (.hgt, .dem), mesh (.obj, .stl, .ply, .glb, .dae), point cloud (.ply, .xyz, .pcd,
-    .las, .laz) or MuJoCo scene (.xml); or a folder of such files."""
+    geodata (.hgt, .dem), mesh (.obj, .stl, .ply, .glb, .dae), point cloud (.ply, .xyz, .pts, .csv,
+    .pcd, .las, .laz) or scene (.xml of MuJoCo, .usd, .sdf or .world of Gazebo); or a folder of
+    such files."""
 
     output: OutputPath
     """File to write, as of terrainkit generate."""

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from terrainkit.errors import listing
+from terrainkit.importing import point_table
 from terrainkit.importing.georeference import Georeference
-from terrainkit.importing.height_source import decode
+from terrainkit.importing.height_source import Source, decode
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.pixels import pixels_raster
-from terrainkit.importing.raster import Raster
 from terrainkit.settings.toml_text import read_text
 
 SUFFIXES = (".asc",)
@@ -32,8 +32,10 @@ def is_grid(path: Path) -> bool:
         return bool(re.match(rb"\s*(ncols|nrows)\s", file.read(100), re.IGNORECASE))
 
 
-def read(path: Path, options: ReadOptions) -> Raster:
+def read(path: Path, options: ReadOptions) -> Source:
     """Return the heights of a grid, whose first row has the highest y.
+
+    CloudCompare writes points with the same suffix: rows of at least three numbers.
 
     Args:
         path: The .asc file.
@@ -45,6 +47,8 @@ def read(path: Path, options: ReadOptions) -> Raster:
     Raises:
         HeightFileError: if the header or the number of heights is wrong.
     """
+    if not is_grid(path) and point_table.has_points(path, is_named=False):
+        return point_table.read(path, options)
     found = decode(_read_grid, path)
     dx, dy, x, y, nodata = found["header"].tolist()
     projection = path.with_suffix(".prj")

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from terrainkit.importing import asc
 from terrainkit.importing.georeference import Georeference
-from terrainkit.importing.height_source import decode, require
+from terrainkit.importing.height_source import Source, decode, require
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
-from terrainkit.importing.raster import Raster
 
 _DRIVERS = {".hgt": "SRTMHGT", ".dem": "USGSDEM", ".bil": "EHdr", ".img": "HFA"}
 _DRIVERS |= dict.fromkeys((".dt0", ".dt1", ".dt2"), "DTED")
@@ -22,7 +21,7 @@ _WEB_MERCATOR = 3857
 _UNITS = {"ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "us survey foot": 1200 / 3937}
 
 
-def read(path: Path, options: ReadOptions) -> Raster:
+def read(path: Path, options: ReadOptions) -> Source:
     """Return the heights of a raster of geodata: SRTM tiles, USGS DEM, DTED, ERDAS and others.
 
     Args:

@@ -73,7 +73,7 @@ def _read_tiff(path: Path) -> tuple[NDArray[np.generic], Georeference]:
 
 def _pixels(path: Path) -> NDArray[np.generic]:
     """Return the pixels of an image, red first; transparent ones are masked."""
-    pixels = decode(_read_pixels, path)["pixels"]
+    pixels = decode(read_pixels, path)["pixels"]
     if pixels.ndim == 2:
         return pixels
     colors = pixels[..., 2::-1]  # OpenCV has blue first
@@ -82,7 +82,8 @@ def _pixels(path: Path) -> NDArray[np.generic]:
     return np.ma.masked_array(colors, np.broadcast_to(pixels[..., 3:] == 0, colors.shape))
 
 
-def _read_pixels(path: Path) -> dict[str, Any]:
+def read_pixels(path: Path) -> dict[str, Any]:
+    """Return `pixels` of an image, blue first."""
     # OpenCV compares the size in the header with it before it decodes.
     os.environ["OPENCV_IO_MAX_IMAGE_PIXELS"] = str(MAX_PIXELS)
     import cv2

@@ -24,6 +24,8 @@ CellSides = Annotated[
     tuple[Size, ...], Meta(min_length=1, max_length=2, extra={"metavar": "X [Y]"})
 ]
 UpAxis = Literal["auto", "z", "y"]
+PointClass = Annotated[int, Meta(ge=0, le=255)]
+PointClasses = Annotated[tuple[PointClass, ...], Meta(min_length=1, extra={"alias": "--class"})]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +65,10 @@ class ReadOptions(Config):
     hole_depth: NonNegative = 2.0
     """Depth of holes [m]: missing ground inside a mesh or a scene, and all missing ground if its
     parts stand apart; 0: missing heights."""
+
+    point_class: PointClasses | None = None
+    """Classes of the points of a .las or .laz file that are the ground; none: 2 where the file has
+    it, with a warning."""
 
     up: UpAxis = "auto"
     """Axis of a mesh or point cloud that points up; auto: y for glTF, what a .dae states, z for

@@ -89,7 +89,7 @@ def read(path: Path, options: ReadOptions) -> Source:
     Raises:
         HeightFileError: if it has neither triangles nor points, or a vertex is invalid.
     """
-    arrays = decode(_read_mesh, path)
+    arrays = decode(read_arrays, path)
     if not len(arrays["faces"]) and len(arrays.get("points", ())):
         return make_point_source(path, arrays["points"], options)
     return make_mesh_source(path, arrays, options)
@@ -141,7 +141,8 @@ def _warn_about_up(path: Path, source: MeshSource, up: str) -> None:
         )
 
 
-def _read_mesh(path: Path) -> dict[str, Any]:
+def read_arrays(path: Path) -> dict[str, Any]:
+    """Return `vertices`, `faces` and `points` of a mesh file, and its `unit` and `up` if stated."""
     import trimesh
 
     # Without a path, trimesh opens no other files.

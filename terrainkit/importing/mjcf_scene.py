@@ -1,9 +1,9 @@
-"""Read the ground from an MJCF scene: the geoms that are fixed to the world.
+"""Read the ground from an MJCF scene or a Gazebo world: the geoms that are fixed to the world.
 
 Unlike MuJoCo's rays, faces have every surface below each other, and closed bodies for solids.
 """
 
-from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,13 @@ import numpy as np
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files.child_process import ProcessLimits
 from terrainkit.importing.height_source import Array, decode, warn
+from terrainkit.importing.image import read_pixels
 from terrainkit.importing.import_options import ReadOptions
-from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
-from terrainkit.importing.mjcf_text import read_text
+from terrainkit.importing.mesh_source import MeshSource, make_mesh_source, read_arrays
+from terrainkit.importing.mjcf_text import MjcfText, read_text
+from terrainkit.importing.scene_mesh import SceneMesh, unit_shapes
 
-SUFFIXES = (".xml",)
-
-PLANE_MARGIN = 2.0
-"""Width of an infinite plane around the other geoms [m]."""
+SUFFIXES = (".xml", ".sdf", ".world")
 
 _BYTES_PER_STEP = 1 << 20
 """Size of files for which MuJoCo may take 10 s and a quarter of a gigabyte more."""
@@ -32,11 +31,11 @@ _MANY_GEOMS = (1000, 5000)
 def read(path: Path, options: ReadOptions) -> MeshSource:
     """Return the fixed geoms that collide as a mesh, with z up and in meters.
 
-    Bodies with joints, such as robots, are removed. Planes end `PLANE_MARGIN` beyond the other
+    Bodies with joints, such as robots, are removed. Planes end 2 m beyond the other
     geoms.
 
     Args:
-        path: The scene; MuJoCo opens the files that it refers to.
+        path: The scene, or a world or model of Gazebo; MuJoCo opens the files that it refers to.
         options: How to read the file.
 
     Warns:
@@ -48,22 +47,25 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     scene = read_text(path)
     steps = scene.num_bytes // _BYTES_PER_STEP
     limits = ProcessLimits(seconds=min(20.0 + 10 * steps, 120.0), memory=min(4 + steps, 32) << 28)
-    arrays = decode(_read_scene, path, scene.text, scene.models, limits=limits)
+    arrays = decode(_read_scene, path, scene, limits=limits)
     if not len(arrays["faces"]):
         raise HeightFileError(
-            f"{path}: got a scene without ground; expected geoms that collide in the world body"
+            f"{path}: got a scene without ground; expected geoms that collide in the world body, "
+            "or static models"
         )
-    moving = [str(name) or "one without name" for name in arrays["moving"]]
+    moving = [str(name) or "one without name" for name in [*scene.moving, *arrays["moving"]]]
     if moving:
-        warn(f"{path}: bodies with joints are left out: {listing(moving)}")
-    return make_mesh_source(path, arrays, options)
+        warn(f"{path}: bodies that move are left out: {listing(moving)}")
+    up = "z" if options.up == "auto" else options.up
+    return make_mesh_source(path, arrays, replace(options, up=up))
 
 
-def _read_scene(_: Path, text: str, models: dict[str, bytes]) -> dict[str, Any]:
+def _read_scene(_: Path, scene: MjcfText) -> dict[str, Any]:
     import mujoco
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write MUJOCO_LOG.TXT
-    spec = mujoco.MjSpec.from_string(text, include=models or None)
+    spec = mujoco.MjSpec.from_string(scene.text, include=scene.models or None)
+    _read_files(spec, scene)
     world = spec.worldbody
 
     @cache
@@ -92,33 +94,44 @@ def _read_scene(_: Path, text: str, models: dict[str, bytes]) -> dict[str, Any]:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    meshes = [(np.empty((0, 3)), np.empty((0, 3), np.int32)), *_geom_meshes(model, data)]
-    vertices, faces = [mesh[0] for mesh in meshes], [mesh[1] for mesh in meshes]
-    starts = np.cumsum([0, *map(len, vertices)], dtype=np.int32)
-    return {
-        "vertices": np.concatenate(vertices),
-        "faces": np.concatenate([mesh + start for mesh, start in zip(faces, starts, strict=False)]),
-        "moving": np.array([body.name for body in moving], dtype=str),
-        "unit": 1.0,
-    }
+    moving_names = np.array([body.name for body in moving], dtype=str)
+    return {**_scene_mesh(model, data).arrays(), "moving": moving_names, "unit": 1.0}
 
 
-def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:
-    """Yield the vertices and faces of each geom in the frame of the world, planes last."""
+def _read_files(spec: Any, scene: MjcfText) -> None:
+    """Read the meshes and heightmaps of a Gazebo world, some of which MuJoCo cannot read."""
+    for name, file in scene.meshes.items():
+        arrays, mesh = read_arrays(file), spec.mesh(name)
+        mesh.uservert = (arrays["vertices"] * arrays.get("unit", 1.0)).ravel()
+        mesh.userface = arrays["faces"].ravel()
+    for name, file in scene.images.items():
+        pixels = read_pixels(file)["pixels"].astype(float)
+        if pixels.ndim > 2:
+            pixels = pixels[..., 2]  # Gazebo takes red
+        field, low, top = spec.hfield(name), pixels.min(), max(pixels.max(), 1.0)
+        # The largest value has the upper height; MuJoCo also has the smallest one at 0.
+        lift = field.size[2] * low / top
+        field.nrow, field.ncol = pixels.shape
+        field.userdata = pixels[::-1].ravel()
+        field.size[2] = max(field.size[2] - lift, 1e-6)
+        for geom in spec.geoms:
+            if geom.hfieldname == name:
+                geom.pos[2] += lift
+
+
+def _scene_mesh(model: Any, data: Any) -> SceneMesh:
+    """Return the geoms in the frame of the world."""
     from mujoco import mjtGeom as Geom
 
-    shapes = _unit_shapes(level=4 - sum(model.ngeom > number for number in _MANY_GEOMS))
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    order = np.argsort(model.geom_type == Geom.mjGEOM_PLANE, kind="stable")
-    for k in order[model.geom_group[order] == 1].tolist():
+    scene = SceneMesh()
+    shapes = unit_shapes(level=4 - sum(model.ngeom > number for number in _MANY_GEOMS))
+    for k in np.flatnonzero(model.geom_group == 1).tolist():
         kind = Geom(model.geom_type[k])
         size = model.geom_size[k]
         asset = model.geom_dataid[k]
         place, axes = data.geom_xpos[k], data.geom_xmat[k].reshape(3, 3)
         if kind == Geom.mjGEOM_PLANE:
-            if lower[0] > upper[0]:
-                lower, upper = place - size, place + size
-            yield _plane(place, axes[:, 2], lower[:2] - PLANE_MARGIN, upper[:2] + PLANE_MARGIN)
+            scene.add_plane(place, axes[:, 2], size)
             continue
         if kind == Geom.mjGEOM_HFIELD:
             vertices, faces = _hfield(model, asset)
@@ -132,10 +145,8 @@ def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:
             vertices = vertices * size[radii]
             if kind == Geom.mjGEOM_CAPSULE:
                 vertices[:, 2] += size[1] * np.sign(vertices[:, 2].round(9))
-        vertices = vertices @ axes.T + place
-        lower = np.minimum(lower, vertices.min(axis=0))
-        upper = np.maximum(upper, vertices.max(axis=0))
-        yield vertices, faces
+        scene.add(vertices @ axes.T + place, faces)
+    return scene
 
 
 _SHAPES = {
@@ -146,33 +157,6 @@ _SHAPES = {
     "mjGEOM_CAPSULE": ("sphere", [0, 0, 0]),
 }
 """Unit shape of a type of geom, and its elements of `size` along x, y and z."""
-
-
-def _unit_shapes(level: int) -> dict[str, tuple[Array, Any]]:
-    """Return the vertices and faces of shapes with half size 1.
-
-    At level 4, a cylinder has 128 sides: for a radius of 1 m, the error is 0.3 mm.
-    """
-    from trimesh import creation
-
-    meshes = {
-        "box": creation.box((2.0, 2.0, 2.0)),
-        "cylinder": creation.cylinder(1.0, 2.0, sections=8 << level),
-        "sphere": creation.icosphere(level),
-    }
-    return {
-        name: (np.array(mesh.vertices), mesh.faces.astype(np.int32))
-        for name, mesh in meshes.items()
-    }
-
-
-def _plane(place: Array, normal: Array, lower: Array, upper: Array) -> tuple[Array, Any]:
-    """Return the rectangle of a plane above the square from `lower` to `upper`."""
-    if abs(normal[2]) < 0.1:
-        raise ValueError(f"got a plane with normal {normal.round(3)}; expected one that faces up")
-    x, y = np.array([[lower[0], upper[0], upper[0], lower[0]], np.repeat([lower[1], upper[1]], 2)])
-    z = place[2] - ((x - place[0]) * normal[0] + (y - place[1]) * normal[1]) / normal[2]
-    return np.column_stack([x, y, z]), np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def _hfield(model: Any, asset: int) -> tuple[Array, Any]:

@@ -1,4 +1,4 @@
-"""Reduce an MJCF scene to what can be ground, before MuJoCo reads it.
+"""Reduce an MJCF scene, or a Gazebo world, to what can be ground, before MuJoCo reads it.
 
 MuJoCo opens every file that a scene names, also pipes and devices, and allocates what attributes
 claim. Its parser needs quadratic time for bodies, and cubic time for the names of copies.
@@ -43,6 +43,15 @@ class MjcfText:
     models: dict[str, bytes] = field(default_factory=dict)
     """Contents of the attached models by file name."""
 
+    meshes: dict[str, Path] = field(default_factory=dict)
+    """Files of the meshes of a Gazebo world, by name."""
+
+    images: dict[str, Path] = field(default_factory=dict)
+    """Images of the heightmaps of a Gazebo world, by name."""
+
+    moving: list[str] = field(default_factory=list)
+    """Models of a Gazebo world that are left out."""
+
     num_bytes: int = 0
     """Size of the files that are read."""
 
@@ -57,7 +66,7 @@ def read_text(path: Path) -> MjcfText:
     with prefixed_errors(f"{path}: "):
         try:
             reader.scene.text, _ = reader.model(path, ())
-        except (SyntaxError, ValueError) as error:
+        except (SyntaxError, ValueError, RecursionError) as error:
             raise HeightFileError(f"cannot be read: {error}") from error
     return reader.scene
 
@@ -71,9 +80,19 @@ class _Reader:
         """Return the text of a model, and its number of elements, copies included."""
         from lxml import etree
 
-        root = self._document(path, path.parent, parents)
+        root = self._parse(path, parents)
+        if root.tag == "sdf" and not parents:
+            from terrainkit.importing.sdf_text import SdfReader
+
+            sdf = SdfReader(self._parse)
+            root = sdf.translate(root, path)
+            self.scene.meshes, self.scene.images = sdf.meshes, sdf.images
+            self.scene.moving = sdf.moving
+            files = {*sdf.meshes.values(), *sdf.images.values()}
+            self.scene.num_bytes += sum(file.stat().st_size for file in files)
         if root.tag != "mujoco":
-            raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco>")
+            raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco> or <sdf>")
+        self._include(root, path, path.parent, parents)
         _remove_unused(root)
         self._resolve_assets(root, path.parent)
         largest = 1
@@ -87,8 +106,8 @@ class _Reader:
         size = _count_elements(root, {**_WEIGHTS, "attach": largest})
         return etree.tostring(root, encoding="unicode"), size
 
-    def _document(self, path: Path, folder: Path, parents: tuple[Path, ...]) -> Any:
-        """Return the root of a document, with the included documents in their places."""
+    def _parse(self, path: Path, parents: tuple[Path, ...]) -> Any:
+        """Return the root of a document."""
         from lxml import etree
 
         if path in parents:
@@ -100,23 +119,26 @@ class _Reader:
             raise HeightFileError(f"got more than {_MAX_FILES} files or {MAX_FILE_BYTES} bytes")
         data = path.read_bytes()
         if b"<!DOCTYPE" in data:
-            raise HeightFileError("got a document type; expected MJCF, which has none")
+            raise HeightFileError("got a document type; expected MJCF or SDF, which have none")
         if data.count(b"<") > 2 * MAX_ELEMENTS:
             raise HeightFileError(f"got a document of more than {MAX_ELEMENTS} elements")
         # In another encoding, the document type, and so entities, would have other bytes.
         parser = etree.XMLParser(
             encoding="utf-8", huge_tree=True, no_network=True, remove_comments=True, remove_pis=True
         )
-        root = etree.fromstring(data, parser)
+        return etree.fromstring(data, parser)
+
+    def _include(self, root: Any, path: Path, folder: Path, parents: tuple[Path, ...]) -> None:
+        """Put the included documents in their places."""
         for include in [*root.iter("include")]:
             name = include.get("file", "")
             parent = include.getparent()
             file = folder / name if (folder / name).exists() else path.parent / name
             with prefixed_errors(f"{name}: "):
-                part = self._document(file, folder, (*parents, path))
+                part = self._parse(file, (*parents, path))
+                self._include(part, file, folder, (*parents, path))
             position = parent.index(include)
             parent[position : position + 1] = part[:]
-        return root
 
     def _resolve_assets(self, root: Any, folder: Path) -> None:
         """Check meshes and heightfields, and make the paths of their files absolute."""

@@ -1,6 +1,7 @@
 """Read the ground from a point cloud."""
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError
+from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing.height_source import (
     Array,
     Source,
@@ -16,12 +17,22 @@ from terrainkit.importing.height_source import (
     cover_positions,
     decode,
     require,
+    warn,
     with_z_up,
 )
 from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
 from terrainkit.importing.raster import Raster
 
-SUFFIXES = (".xyz", ".pcd", ".las", ".laz")
+SUFFIXES = (".pcd", ".las", ".laz")
+
+GROUND_CLASS = 2
+"""Class of the ground in LAS files, by the ASPRS."""
+
+_LENGTH_UNIT = 3076
+"""GeoTIFF key of the unit of lengths."""
+
+_FEET = (9002, 9003)
+"""Its values for feet and US survey feet."""
 
 MIN_CELL = 0.1
 """Smallest default cell [m]."""
@@ -88,7 +99,29 @@ def read(path: Path, options: ReadOptions) -> Source:
     """
     if (suffix := path.suffix.lower()) in (".las", ".laz"):
         require(path, "laspy", "las")
-    return make_point_source(path, decode(_READERS[suffix], path)["points"], options)
+    arrays = decode(_READERS[suffix], path)
+    points = arrays["points"]
+    if "classes" in arrays:
+        if arrays["is_feet"] and not options.scale:
+            warn(f"{path}: states feet, which are taken as meters; --scale 0.3048 converts them")
+        points = points[_is_ground(path, arrays["classes"], options)]
+    return make_point_source(path, points, options)
+
+
+def _is_ground(path: Path, classes: NDArray[Any], options: ReadOptions) -> NDArray[np.bool_]:
+    """Return whether each point is in one of the classes that are the ground."""
+    used = np.unique(classes)
+    wanted = options.point_class or ((GROUND_CLASS,) if GROUND_CLASS in used else used.tolist())
+    is_ground = np.isin(classes, wanted)
+    known = " ".join(map(str, used.tolist()))
+    if not is_ground.any():
+        raise ConfigError(f"class: got {wanted}; {path} has the classes {known}")
+    if not options.point_class and not is_ground.all():
+        warn(
+            f"{path}: only the {int(is_ground.sum())} of {len(classes)} points of class "
+            f"{GROUND_CLASS} (ground) are taken; --class {known} takes all"
+        )
+    return is_ground
 
 
 def make_point_source(path: Path, points: NDArray[Any], options: ReadOptions) -> Source:
@@ -132,15 +165,6 @@ def _make_raster(points: Array) -> Raster | None:
     return Raster(values=values, spacing=(cell, cell), lower=(x, y))
 
 
-def _read_xyz(path: Path) -> dict[str, Any]:
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first = file.readline()
-    delimiter = next((character for character in ",;" if character in first), None)
-    skip = int(not first.lstrip().startswith(tuple("+-.0123456789")))
-    columns: dict[str, Any] = {"usecols": (0, 1, 2), "ndmin": 2, "comments": ("#", "/")}
-    return {"points": np.loadtxt(path, delimiter=delimiter, skiprows=skip, **columns)}
-
-
 def _read_pcd(path: Path) -> dict[str, Any]:
     """Return the points of a file of PCL, whose header has lines such as FIELDS x y z."""
     head, _, rest = path.read_bytes().partition(b"\nDATA ")
@@ -164,7 +188,14 @@ def _read_pcd(path: Path) -> dict[str, Any]:
 def _read_las(path: Path) -> dict[str, Any]:
     import laspy
 
-    return {"points": np.asarray(laspy.read(path).xyz, float)}
+    cloud = laspy.read(path)
+    records = cloud.header.vlrs
+    keys = [key for record in records for key in getattr(record, "geo_keys", ())]
+    is_feet = any(key.id == _LENGTH_UNIT and key.value_offset in _FEET for key in keys)
+    texts = [getattr(record, "string", "") for record in records]
+    is_feet |= any(re.search('UNIT\\["[^"]*(foot|feet|ft)', text, re.IGNORECASE) for text in texts)
+    classes = np.asarray(cloud.classification)
+    return {"points": np.asarray(cloud.xyz, float), "classes": classes, "is_feet": is_feet}
 
 
-_READERS = {".xyz": _read_xyz, ".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}
+_READERS = {".pcd": _read_pcd, ".las": _read_las, ".laz": _read_las}

@@ -212,15 +212,20 @@ def make_raster(
 
 
 def _warn_of_range(path: Path, values: Array, most: int, low: float, high: float) -> None:
-    """Warn if no value comes near the largest one of its type, which has the upper height."""
+    """Warn if the values do not use their type, so that simulators read other heights from them."""
     known = values[~np.isnan(values)]
-    top = float(known.max(initial=0.0))
-    if 0 < top < _FULL_RANGE * most:
-        warn(
-            f"{path}: got values from {known.min():g} to {top:g}; --height-range is for 0 and "
-            f"{most}. In MuJoCo and Gazebo, the largest value of the image has the upper height: "
-            f"--height-range {low:g} {low + (high - low) * most / top:.6g}"
-        )
+    bottom, top = float(known.min(initial=most)), float(known.max(initial=0.0))
+    if not bottom < top or (bottom == 0 and top >= _FULL_RANGE * most):
+        return
+    step, largest = (high - low) / (top - bottom), low + (high - low) * most / top
+    text = f"--height-range {low - step * bottom:.6g} {low + step * (most - bottom):.6g}"
+    if bottom > 0 and top < most:
+        text += f"; in Gazebo, only the largest one has: --height-range {low:g} {largest:.6g}"
+    simulators = "MuJoCo" if bottom > 0 else "MuJoCo and Gazebo"
+    warn(
+        f"{path}: got values from {bottom:g} to {top:g}; --height-range is for 0 and {most}. In "
+        f"{simulators}, the smallest and the largest value of the image have these heights: {text}"
+    )
 
 
 def _scale_and_offset(

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit.importing import asc
-from terrainkit.importing.height_source import decode
+from terrainkit.importing import asc, point_table
+from terrainkit.importing.height_source import Source, decode
 from terrainkit.importing.import_options import ReadOptions
-from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.importing.raster import make_raster
 from terrainkit.settings.text import truncate
 
 SUFFIXES = (".txt", ".csv")
@@ -22,15 +22,18 @@ _MAX_LINES = 20
 """Lines in which numbers have to begin."""
 
 _MIN_POINTS = 50
-"""Rows of three numbers from which on they are taken for points (x, y, z)."""
+"""Rows from which on few numbers in a row are taken for points (x, y, z)."""
+
+_MIN_SHAPE = 10
+"""Rows for each of more than three columns from which on they are."""
 
 
-def read(path: Path, options: ReadOptions) -> Raster:
+def read(path: Path, options: ReadOptions) -> Source:
     """Return the heights of a table: rows along x, columns along y, as numpy.savetxt writes arrays.
 
     Numbers are separated by commas, semicolons, tabs or spaces. Comments, lines of text and a line
     of sizes before the numbers, and pandas' numbers of rows and columns are skipped. Empty cells
-    are missing heights. An ESRI ASCII grid is read as such.
+    are missing heights. An ESRI ASCII grid is read as such, and points if a line names x, y and z.
 
     Args:
         path: The file.
@@ -42,6 +45,8 @@ def read(path: Path, options: ReadOptions) -> Raster:
     """
     if asc.is_grid(path):
         return asc.read(path, options)
+    if point_table.has_points(path, is_named=True):
+        return point_table.read(path, options)
     return make_raster(path, decode(_read_table, path)["heights"], options)
 
 
@@ -54,11 +59,11 @@ def _read_table(path: Path) -> dict[str, Any]:
     if not delimiter:
         raise ValueError("got text; expected a table of numbers")
     end = delimiter if lines[start].endswith(delimiter) else ""
-    rows = [line.removesuffix(end) for line in lines[start:]]
+    texts = [line.removesuffix(end) for line in lines[start:]]
     separator = None if delimiter == " " else delimiter
     try:
         table = np.loadtxt(
-            rows, delimiter=separator, comments=None, ndmin=2, converters=_float_or_nan
+            texts, delimiter=separator, comments=None, ndmin=2, converters=_float_or_nan
         )
     except ValueError as error:
         reason = str(error).partition("; use")[0]
@@ -72,10 +77,12 @@ def _read_table(path: Path) -> dict[str, Any]:
         row = table[0, is_numbered:]
         if len(row) > 2 and np.array_equal(row, np.arange(len(row))):
             table = table[1:, is_numbered:]
-    if min(table.shape) < 2 or (table.shape[1] == 3 and len(table) >= _MIN_POINTS):
+    rows, cols = table.shape
+    least = max(_MIN_POINTS, _MIN_SHAPE * cols if cols > 3 else 0)
+    if min(rows, cols) < 2 or (cols > 2 and rows >= least):
         raise ValueError(
-            f"got {len(table)} rows of {table.shape[1]} numbers; expected a row of heights per "
-            "line; rename points (x, y, z) to .xyz"
+            f"got {rows} rows of {cols} numbers; expected a row of heights per line; rename points "
+            "(x, y, z, others) to .xyz, or save a strip of heights as .npy"
         )
     return {"heights": table}
 

@@ -6,7 +6,8 @@ import terrainkit
 from terrainkit import importing
 from terrainkit.errors import HeightFileError
 from terrainkit.importing import height_source
-from terrainkit.importing.height_source import check_file
+from terrainkit.importing.height_source import check_file, open_source
+from terrainkit.importing.import_options import ReadOptions
 
 
 @pytest.mark.parametrize(
@@ -26,6 +27,20 @@ def test_check_file_limits_the_size(tmp_path, monkeypatch, size, message):
             check_file(path)
     else:
         check_file(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.FBX", r"a\.FBX: no reader for '\.FBX'; convert it with Blender \(File"),
+        ("a.e57", "convert it with PDAL .pdal translate a.e57 a.laz"),
+        ("a.dwg", "ODA File Converter"),
+        ("a.docx", r"no reader for '\.docx' .*; there are: \.asc, "),
+    ],
+)
+def test_file_without_reader_names_the_converter(name, message):
+    with pytest.raises(HeightFileError, match=message):
+        open_source(Path(name), ReadOptions())
 
 
 def test_check_file_names_the_reason_of_the_system():

@@ -66,7 +66,7 @@ def tinted(*offsets):
 @pytest.mark.parametrize("opacity", [(), (0,)])
 def test_image_of_equal_colors_is_gray(tmp_path, opacity):
     path = write(tmp_path / "a.png", tinted(0, 0, 0, *opacity))
-    raster = read(path, ReadOptions(file_cell=9.0, height_range=(0.0, 65.535)))
+    raster = read(path, ReadOptions(file_cell=9.0, scale=1e-3))
     expected = GRAY[::-1].T * 1e-3
     if opacity:
         expected[0, 3] = np.nan  # the pixel of opacity 0
@@ -75,7 +75,7 @@ def test_image_of_equal_colors_is_gray(tmp_path, opacity):
 
 def test_image_of_other_colors_needs_a_band(tmp_path):
     path = write(tmp_path / "a.png", tinted(0, 2000, 0))
-    options = {"file_cell": 9.0, "height_range": (0.0, 65.535)}
+    options = {"file_cell": 9.0, "scale": 1e-3}
     with pytest.raises(HeightFileError, match=r"got 3 different colors .*--band 1"):
         read(path, ReadOptions(**options))
     green = read(path, ReadOptions(**options, band=2))

@@ -57,12 +57,28 @@ def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
         make_raster(Path("a.npy"), values, ReadOptions(file_cell=1.0))
 
 
-@pytest.mark.parametrize(("top", "is_short"), [(127, True), (191, True), (192, False), (0, False)])
+@pytest.mark.parametrize(
+    ("bottom", "top", "expected"),
+    [
+        (0, 127, "In MuJoCo and Gazebo, .* --height-range 1 5.01575$"),
+        (0, 191, "In MuJoCo and Gazebo, .* --height-range 1 3.67016$"),
+        (0, 192, ""),
+        (0, 0, ""),
+        (7, 7, ""),
+        # 40 values are 2 m in MuJoCo, 168 in Gazebo.
+        (
+            128,
+            168,
+            r"MuJoCo, .* --height-range -5.4 7.35; in Gazebo, .* --height-range 1 4.03571$",
+        ),
+        (128, 255, r"In MuJoCo, .* --height-range -1.01575 3$"),
+    ],
+)
 @pytest.mark.filterwarnings("ignore:.*8 bits have terraces")
-def test_values_that_do_not_use_their_range_are_warned_of(top, is_short):
-    values = np.linspace(0, top, 24).astype(np.uint8).reshape(4, 6)
+def test_values_that_do_not_use_their_range_are_warned_of(bottom, top, expected):
+    values = np.linspace(bottom, top, 24).astype(np.uint8).reshape(4, 6)
     options = ReadOptions(file_cell=(0.1,), height_range=(1.0, 3.0))
-    message = rf"got values from 0 to {top}; .* --height-range 1 {1 + 2 * 255 / (top or 1):.6g}$"
-    with pytest.warns(TerrainkitWarning, match=message) if is_short else nullcontext():
+    message = f"got values from {bottom} to {top}; .*{expected}"
+    with pytest.warns(TerrainkitWarning, match=message) if expected else nullcontext():
         raster = make_raster(Path("a.png"), values, options)
     assert raster.values.max() == pytest.approx(1 + 2 * top / 255)

@@ -51,7 +51,10 @@ def test_text_of_an_ascii_grid_is_one(tmp_path):
         ("n m\n4 3 0.5\n" + "1 2\n" * 3, r"at row 2; delete the line '4 3 0\.5' if it is no row"),
         ("1 2 3\n4 five 6\n", "could not convert string 'five' to float64 at row 1"),
         ("1\n2\n3\n", "got 3 rows of 1 numbers; expected a row of heights per line"),
-        ("0.1 0.2 0.3\n" * 50, r"got 50 rows of 3 numbers; .* rename points \(x, y, z\) to \.xyz"),
+        (
+            "0.1 0.2 0.3\n" * 50,
+            r"got 50 rows of 3 numbers; .* rename points \(x, y, z, o.*\) to \.xyz",
+        ),
         ("\0" * 99, "got text"),
     ],
 )
