@@ -72,7 +72,7 @@ def steps_of_one_cell(heights: NDArray[np.float32], threshold: float) -> NDArray
     """Return the bits of the walls of a file, which is not known between its samples.
 
     A difference above the threshold is a wall unless the ground slopes on: a neighboring edge in
-    line exceeds the threshold as well, and is at least a third as high.
+    line exceeds the threshold in the same direction, and is at least a third as high.
 
     Args:
         heights: Samples [m], shape (nx, ny).
@@ -83,11 +83,12 @@ def steps_of_one_cell(heights: NDArray[np.float32], threshold: float) -> NDArray
     """
     bits = np.zeros(heights.shape, np.uint8)
     for values, bit, target in ((heights, ALONG_X, bits), (heights.T, ALONG_Y, bits.T)):
-        step = np.abs(np.diff(values, axis=0))
-        neighbors = np.pad(step, ((1, 1), (0, 0)))
-        beside = np.maximum(neighbors[:-2], neighbors[2:])
-        slopes_on = (beside > threshold) & (3 * beside >= step)
-        target[:-1] |= bit * ((step > threshold) & ~slopes_on)
+        step = np.diff(values, axis=0)
+        size, neighbors = np.abs(step), np.pad(step, ((1, 1), (0, 0)))
+        # The neighbor that goes up or down as well, and not the other side of a narrow block.
+        beside = np.maximum(neighbors[:-2] * np.sign(step), neighbors[2:] * np.sign(step))
+        slopes_on = (beside > threshold) & (3 * beside >= size)
+        target[:-1] |= bit * ((size > threshold) & ~slopes_on)
     return bits
 
 

@@ -225,7 +225,11 @@ def _wall_errors(terrain_map: TerrainMap, points: Array, top: Array, *, is_exact
         beyond = np.abs(corners - z).min(axis=0)
     else:
         beyond = np.maximum(np.maximum(z - np.maximum(highest, top), lowest - z), 0.0)
-    return np.where(highest - lowest > terrain_map.config.wall_threshold, beyond, np.inf)
+    has_wall = highest - lowest > terrain_map.config.wall_threshold
+    if terrain_map.walls is not None:  # a slope is no wall, however steep
+        bits = [terrain_map.walls[i, j] for i in around[..., 0] for j in around[..., 1]]
+        has_wall = np.any(bits, axis=0)
+    return np.where(has_wall, beyond, np.inf)
 
 
 def _overhangs(terrain_map: TerrainMap, columns: Columns | None) -> dict[str, Any]:

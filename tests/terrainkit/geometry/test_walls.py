@@ -71,6 +71,7 @@ def exact_heights(heights, rule, x, y):
         ([0, 0, 0.5, 3, 3], [0, 0, 1, 0]),  # the foot of a cliff
         ([0, 0, 1, 2, -4, -4], [0, 0, 0, 1, 0]),  # a ramp that ends at a wall
         ([0, 0, 2, 2, 0, 0], [0, 1, 0, 1, 0]),  # a block
+        ([0, 0, 2, 0, 0], [0, 1, 1, 0]),  # a block of one cell
     ],
 )
 def test_a_slope_that_goes_on_is_no_wall(heights, walls):
