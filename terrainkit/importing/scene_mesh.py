@@ -12,9 +12,6 @@ from terrainkit.importing.height_source import Array
 PLANE_MARGIN = 2.0
 """Width of an infinite plane around the other shapes [m]."""
 
-MAX_VERTICES = 50_000_000
-"""Most vertices of a scene."""
-
 Faces = NDArray[np.int32]
 
 
@@ -27,6 +24,9 @@ class SceneMesh:
     planes: list[tuple[Array, Array, Array]] = field(default_factory=list)
     num_vertices: int = 0
 
+    max_vertices: int = 50_000_000
+    """Most vertices, copies included."""
+
     def add(self, vertices: Array, faces: Faces) -> None:
         """Add a mesh.
 
@@ -35,13 +35,13 @@ class SceneMesh:
             faces: Triangles, shape (nf, 3).
 
         Raises:
-            ValueError: if the scene has more than `MAX_VERTICES` vertices.
+            ValueError: if the scene has more than `max_vertices` vertices.
         """
         self.vertices.append(vertices)
         self.faces.append(faces + np.int32(self.num_vertices))
         self.num_vertices += len(vertices)
-        if self.num_vertices > MAX_VERTICES:
-            raise ValueError(f"got a scene of more than {MAX_VERTICES} vertices, copies included")
+        if self.num_vertices > self.max_vertices:
+            raise ValueError(f"got more than {self.max_vertices} vertices, copies included")
 
     def add_plane(self, point: Array, normal: Array, size: Array) -> None:
         """Add an infinite plane.

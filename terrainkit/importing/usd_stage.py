@@ -12,12 +12,19 @@ import numpy as np
 
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files import sandbox
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit.importing.height_source import Array, decode, require, warn, with_z_up
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
 from terrainkit.importing.scene_mesh import Faces, SceneMesh, triangulate, unit_shapes
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+
+MAX_VERTICES = 10_000_000
+"""Most vertices of a stage, copies included."""
+
+_LIMITS = ProcessLimits(memory=2 << 30)
+"""USD allocates what a file claims to hold; 2 million faces take half a gigabyte."""
 
 _AXES = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
 """Columns of a shape along z whose axis is another one."""
@@ -45,7 +52,7 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
             refers to is missing, or it has no ground.
     """
     require(path, "pxr", "usd")
-    arrays = decode(_read_stage, path, options.up, options.scale)
+    arrays = decode(_read_stage, path, options.up, options.scale, limits=_LIMITS)
     for note in arrays["notes"].tolist():
         warn(f"{path}: {note}")
     if not len(arrays["faces"]):
@@ -88,7 +95,7 @@ def _read_stage(path: Path, up: str, scale: float | None) -> dict[str, Any]:
     left_out: dict[str, list[Any]] = defaultdict(list)
     shapes = [*_find_shapes(stage.GetPseudoRoot(), frame[None], left_out)]
     has_colliders = any(shape.collides for shape in shapes)
-    scene = SceneMesh()
+    scene = SceneMesh(max_vertices=MAX_VERTICES)
     for shape in shapes:
         if shape.collides if has_colliders else shape.is_visible:
             _add_shape(scene, shape)

@@ -6,7 +6,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
-from terrainkit.importing import scene_mesh
+from terrainkit.importing import usd_stage
 from terrainkit.importing.height_source import open_source
 from terrainkit.importing.import_options import ReadOptions
 from tests.tables import read_table
@@ -131,11 +131,11 @@ def test_stage_without_ground_is_rejected(tmp_path, text, message):
 
 
 def test_stage_of_many_copies_is_rejected(tmp_path, monkeypatch):
-    monkeypatch.setattr(scene_mesh, "MAX_VERTICES", 3000 * 642 - 1)
+    monkeypatch.setattr(usd_stage, "MAX_VERTICES", 3000 * 642 - 1)
     text = 'def PointInstancer "p" {{ rel prototypes = </p/s>\nint[] protoIndices = [{}]\n'
     text += 'point3f[] positions = [{}]\ndef Sphere "s" {{}} }}'
     path = save(tmp_path, METERS + text.format("0," * 3000, "(0,0,0)," * 3000))
-    with pytest.raises(HeightFileError, match="a scene of more than 1925999 vertices, copies incl"):
+    with pytest.raises(HeightFileError, match="got more than 1925999 vertices, copies included"):
         open_source(path, ReadOptions())
 
 
