@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 _MAX_LINES = 20
 """Most lines of the report of several files."""
 
+_EQUAL = "all within 1 cm"
+"""What the report of a single file says where nothing differs."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Import(ConfigCommand):
@@ -82,6 +85,7 @@ class Import(ConfigCommand):
             f"{name}{line}"
             for name, report in zip(names, terrain_map.import_reports, strict=True)
             for line in _report_lines(report, options)
+            if not name or not line.endswith(_EQUAL)
         ]
         for line in lines[:_MAX_LINES]:
             render.result(line)
@@ -102,10 +106,9 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
     if report.lost_ground_area >= 0.005:
         yield f"the map has holes over {report.lost_ground_area:.2f} m2 where the file has ground"
     if report.num_missing or report.filled_area >= 0.005:
-        total = report.covered_area + report.filled_area
         yield (
             f"filled missing heights: {report.num_missing}; the map has ground over "
-            f"{report.filled_area:.2f} m2 of {total:.2f} m2 where the file has none"
+            f"{report.filled_area:.2f} m2 where the file has none"
         )
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
@@ -135,7 +138,7 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
 
 def _differences(report: "ImportReport") -> str:
     if not report.max_error_at or report.max_error <= 0.01:
-        return "all within 1 cm"
+        return _EQUAL
     shares: dict[float, str] = {}
     for share, limit in zip(report.shares, ("1 cm", "5 cm", "a cell"), strict=True):
         shares.setdefault(share, f"{math.floor(1000 * share) / 10:g}% within {limit}")

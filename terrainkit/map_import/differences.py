@@ -68,7 +68,8 @@ def make_report(
         holes: Samples of the map that are in a hole of a mesh.
         counts: Fields of the report that are known.
     """
-    grid, is_mesh = terrain_map.grid, isinstance(source, MeshSource)
+    grid = terrain_map.grid
+    is_mesh = isinstance(source, MeshSource)
     lower = np.maximum(grid.lower, source.lower - origin[:2])
     size = np.maximum(np.minimum(grid.upper, source.upper - origin[:2]) - lower, 0.0)
     places = lower + _random_points(size, grid.cell)
@@ -93,13 +94,12 @@ def make_report(
     is_lost = is_ground & np.all(hole_corners, axis=0)
     area_per_point = float(size.prod()) / max(1, len(places))
     num_hidden = 0 if columns is None else int((columns.sheets > grid.cell / 2).sum())
-    fields: dict[str, Any] = {**_overhangs(terrain_map, columns), **counts}
-    if largest:
-        fields.update(max_error=largest[0][0], max_error_at=largest[0][1:])
     number = max(1, len(error))
     return ImportReport(
         num_points=len(error),
         shares=tuple(int((error <= limit).sum()) / number for limit in (*TOLERANCES, grid.cell)),
+        max_error=largest[0][0] if largest else 0.0,
+        max_error_at=largest[0][1:] if largest else None,
         further_errors=tuple(place for place in largest[1:] if place[0] > TOLERANCES[0]),
         covered_area=float(is_ground.sum()) * area_per_point,
         filled_area=float(is_filled.sum()) * area_per_point,
@@ -107,7 +107,8 @@ def make_report(
         hole_area=int(holes.sum()) * grid.cell**2,
         num_lost_faces=num_lost,
         hidden_area=num_hidden * grid.cell**2,
-        **fields,
+        **_overhangs(terrain_map, columns),
+        **counts,
     )
 
 
@@ -161,7 +162,8 @@ def _face_points(mesh: MeshSource) -> Iterator[Array]:
     for start in range(0, len(mesh.faces), _POINTS_PER_BLOCK):
         corners = mesh.vertices[mesh.faces[start : start + _POINTS_PER_BLOCK]]
         highest = corners[np.arange(len(corners)), np.argmax(corners[..., 2], axis=1)]
-        yield highest + _INSIDE * (corners.mean(axis=1) - highest)
+        centroids = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3
+        yield highest + _INSIDE * (centroids - highest)
 
 
 def _sample_points(raster: Raster) -> Iterator[Array]:

@@ -66,12 +66,12 @@ def _has_place(mesh: MeshSource, xy: Array) -> NDArray[np.bool_]:
     sums = np.zeros((_PARTS + 1, _PARTS + 1), np.int32)
     np.add.at(sums, (i + 1, j + 1), 1)
     sums = sums.cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32)
-    a, b, c = np.clip((mesh.vertices[:, :2] - low) / step, -1, _PARTS + 1)[mesh.faces.T]
+    parts = (mesh.vertices[:, :2] - low) / step
     # Single precision may move an edge.
-    first = np.floor(np.minimum(np.minimum(a, b), c) - 0.01).astype(int).clip(0, _PARTS)
-    i, j = first.T
-    last = np.floor(np.maximum(np.maximum(a, b), c) + 1.01).astype(int).clip(0, _PARTS)
-    i1, j1 = last.T
+    ends = [np.floor(parts + shift).clip(0, _PARTS) for shift in (-0.01, 1.01)]
+    bounds = np.hstack([ends[0], -ends[1]]).astype(np.int16)
+    a, b, c = (bounds.take(corners, axis=0) for corners in mesh.faces.T)
+    i, j, i1, j1 = np.abs(np.minimum(np.minimum(a, b), c)).T
     return np.asarray(sums[i1, j1] - sums[i, j1] - sums[i1, j] + sums[i, j] > 0)
 
 
@@ -84,9 +84,8 @@ def _raster_points(raster: Raster, xy: Array) -> Array:
     is_along_x = np.abs(step[:, 0]) >= np.abs(step[:, 1])
     step[~is_along_x, 0] = step[is_along_x, 1] = 0.0
     places = xy + (near + step - index) * raster.spacing
-    i, j = near.astype(int).T
-    other_i, other_j = np.clip(near + np.sign(step), 0, limit).astype(int).T
-    z, other = (raster.values[pair].astype(float) for pair in ((i, j), (other_i, other_j)))
+    ends = (near, np.clip(near + np.sign(step), 0, limit))
+    z, other = (raster.values[tuple(end.astype(int).T)].astype(float) for end in ends)
     z += np.where(np.isnan(other), 0.0, other - z) * np.abs(step).sum(axis=1)
     return np.column_stack([places, z])[:, None]
 

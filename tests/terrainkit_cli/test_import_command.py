@@ -47,7 +47,7 @@ def test_import_fills_missing_heights(terrainkit, rejected, tmp_path):
     run = terrainkit(*words)
     assert "warning: a.npy: 1 of 600 heights are missing" in run.stderr
     assert (
-        "filled missing heights: 1; the map has ground over 0.01 m2 of 6.00 m2 where the file has "
+        "filled missing heights: 1; the map has ground over 0.01 m2 where the file has "
         "none\n" in run.stdout
     )
 
@@ -71,6 +71,8 @@ def test_import_folder_prints_its_sources(terrainkit, rejected, tmp_path):
     assert run.returncode == 0
     assert "2 of 2 patches have missing heights, such as 1 of scans/gentle.npy" in run.stderr
     assert "wrote a.npz: 2 x 1 patches of 2 m x 2 m" in run.stdout
+    assert "patch (0, 0), gentle.npy: filled missing heights: 1; " in run.stdout
+    assert "compared with" not in run.stdout  # nothing differs
     info = terrainkit("info", "a.npz").stdout.splitlines()
     assert info[-3].split() == ["file", "SHA-256", "patches"]
     assert info[-2].split()[0::2] == ["gentle.npy", "(0,"]
