@@ -471,7 +471,8 @@ def test_walls_are_stored_only_where_the_threshold_would_differ(tmp_path):
 @pytest.mark.parametrize("value", [4, 255])
 def test_walls_out_of_range_are_rejected(tmp_path, value):
     import_array(tmp_path, ramp()).terrain_map.save(tmp_path / "map.npz")
-    arrays = dict(np.load(tmp_path / "map.npz"))
+    with np.load(tmp_path / "map.npz") as file:
+        arrays = dict(file)
     arrays["walls"][3, 3] = value
     np.savez(tmp_path / "bad.npz", **arrays)
     with pytest.raises(MapFileError, match="walls: got an edge out of range"):
