@@ -110,6 +110,17 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
             f"filled missing heights: {report.num_missing}; the map has ground over "
             f"{report.filled_area:.2f} m2 where the file has none"
         )
+    if report.num_steep_slopes:
+        yield (
+            f"between neighboring samples: {report.num_walls} walls, and {report.num_steep_slopes} "
+            "slopes above --slope-threshold that go on"
+        )
+    yield from _lost_parts(report, options)
+    if report.num_points:
+        yield f"compared with the file at {report.num_points} points: {_differences(report)}"
+
+
+def _lost_parts(report: "ImportReport", options: ImportOptions) -> Iterator[str]:
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
     if report.num_lost_faces:
@@ -132,8 +143,6 @@ def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[st
         )
     if report.num_open_bodies and (report.lost_area or report.num_lost_faces):
         yield f"bodies that are not closed, and cannot become solids: {report.num_open_bodies}"
-    if report.num_points:
-        yield f"compared with the file at {report.num_points} points: {_differences(report)}"
 
 
 def _differences(report: "ImportReport") -> str:

@@ -10,6 +10,12 @@ class ImportReport:
     num_missing: int = 0
     """Number of missing heights, which were filled."""
 
+    num_walls: int = 0
+    """Number of neighboring samples with a wall between them, counted if there are steep slopes."""
+
+    num_steep_slopes: int = 0
+    """Number of neighboring samples that differ by more than `slope_threshold` without a wall."""
+
     num_points: int = 0
     """Number of points, not the samples of the map, where the file has ground and its highest
     surface was compared with that of the map."""

@@ -159,6 +159,12 @@ def make_map(
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, holes, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
+    if terrain_map.walls is not None:
+        rules = config.wall_threshold, terrain_map.walls
+        steep, walls = (
+            sum(int(edges.sum()) for edges in wall_edges(heights, rule)) for rule in rules
+        )
+        counts |= {"num_walls": walls, "num_steep_slopes": steep - walls}
     counts["num_missing"] = int(np.isnan(found).sum())
     yield None
     report = make_report(terrain_map, source, origin, columns, holes, **counts)

@@ -447,7 +447,9 @@ def ramp():
 
 
 def test_a_slope_above_the_threshold_stays_a_slope_in_every_view(tmp_path):
-    made = import_array(tmp_path, ramp()).terrain_map
+    imported = import_array(tmp_path, ramp())
+    made, report = imported.terrain_map, imported.report
+    assert (report.num_walls, report.num_steep_slopes) == (40, 19 * 40)
     made.save(tmp_path / "map.npz")
     loaded = tk.TerrainMap.load(tmp_path / "map.npz")
     points = np.random.default_rng(0).uniform([2.1, 0.1], [3.9, 3.9], (200, 2))
