@@ -41,6 +41,11 @@ def cpu_time() -> float:
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
+def user_time() -> float:
+    """Return the processor time of this process without that of the kernel [s]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_utime
+
+
 def process(command: list[str]) -> Callable[[], Any]:
     """Return a function that runs `command` to its end; modules are cached as bytecode."""
     env = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
