@@ -335,6 +335,8 @@ class LeggedEnv(VecEnv):
     def _update_commands(self) -> None:
         """Let commands follow headings and waypoints, and write them into the state."""
         self.velocity_command.update(self.yaw, self.sim.qpos[:, :2].astype(np.float32))
+        if np.array_equal(self.commands, self.state.commands):
+            return
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
 
@@ -346,13 +348,15 @@ class LeggedEnv(VecEnv):
         dt = np.float32(self.cfg.dt)
         total = np.zeros(self.num_envs, np.float32)
         termination = np.zeros_like(total)
+        any_unstable = unstable.any()
         for name, (function, scale) in self.active_rewards.items():
             # Scales are per second, so that they do not depend on the control frequency.
             term = function(self) * np.float32(scale) * dt
             if name == "termination":
                 termination += term
             else:
-                term[unstable] = 0
+                if any_unstable:
+                    term[unstable] = 0
                 total += term
             self.episode_sums[name] += term
         return total + termination

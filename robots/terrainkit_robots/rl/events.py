@@ -173,9 +173,10 @@ def push(env: "LeggedEnv") -> None:
         limit = default if setting is None else setting
         env.steps_until_push -= 1
         env_ids = np.flatnonzero(env.steps_until_push <= 0)
-        env.steps_until_push[env_ids] = interval
-        env.push_vel[env_ids, :2] = env.rng.uniform(-limit, limit, (len(env_ids), 2))
-        env.sim.qvel[:, :2] += env.push_vel[:, :2]
+        if len(env_ids):
+            env.steps_until_push[env_ids] = interval
+            env.push_vel[env_ids, :2] = env.rng.uniform(-limit, limit, (len(env_ids), 2))
+            env.sim.qvel[:, :2] += env.push_vel[:, :2]
 
 
 def push_interval(env: "LeggedEnv") -> int:

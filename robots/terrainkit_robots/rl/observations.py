@@ -256,6 +256,8 @@ def fill_history(env: "LeggedEnv", observations: FloatArray) -> None:
         observations: Observations of the policy, shape (n, width), which are changed.
     """
     if past := env.history_length - 1:
-        new = env.steps_since_reset == 0
+        new = np.flatnonzero(env.steps_since_reset == 0)
+        if not len(new):
+            return
         width = env.obs_history.shape[1] // past
         observations[new, width : width * (1 + past)] = np.tile(observations[new, :width], past)
