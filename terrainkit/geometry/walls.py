@@ -92,6 +92,17 @@ def steps_of_one_cell(heights: NDArray[np.float32], threshold: float) -> NDArray
     return bits
 
 
+def file_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.uint8] | None:
+    """Return `steps_of_one_cell`, or None if the threshold alone gives the same walls."""
+    walls = steps_of_one_cell(heights, threshold)
+    return None if count_walls(heights, walls) == count_walls(heights, threshold) else walls
+
+
+def count_walls(heights: NDArray[np.floating], rule: WallRule) -> int:
+    """Return the number of edges that are walls."""
+    return sum(int(np.count_nonzero(edges)) for edges in wall_edges(heights, rule))
+
+
 def flat_corners(edges: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return whether each corner of a quad is connected only to corners of its height, (4, n).
 

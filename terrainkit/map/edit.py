@@ -44,7 +44,7 @@ def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None
     for row, col in np.ndindex(spawns.shape):
         old = terrain_map.patch(row, col).spawns
         patch_goals = goals[row, col][~np.isnan(goals[row, col, :, 0])]
-        spawn_ground = SpawnGround.of_map(config, new, solids, (row, col))
+        spawn_ground = SpawnGround.of_map(config, new, solids, (row, col), walls)
         rng = partial(np.random.default_rng, [config.seed, row, col])
         positions = _spawn_positions(spawn_ground, f"patch ({row}, {col})", old, rng)
         spawns[row, col] = with_heading(positions, patch_goals)

@@ -14,6 +14,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.walls import WallRule, wall_edges
 from terrainkit.map.map_config import MapConfig
 
 _DISKS_PER_BLOCK = 4096
@@ -39,9 +40,17 @@ class SpawnGround:
     holes: NDArray[np.bool_] | None = None
     """Samples that are no center of a disk, shape `grid.shape`; None for none."""
 
+    walls: NDArray[np.uint8] | None = None
+    """Which edges of the samples are walls, as in `TerrainMap.walls`, shape `grid.shape`."""
+
     @classmethod
     def of_map(
-        cls, config: MapConfig, heights: NDArray[np.float32], solids: Solids, patch: tuple[int, int]
+        cls,
+        config: MapConfig,
+        heights: NDArray[np.float32],
+        solids: Solids,
+        patch: tuple[int, int],
+        walls: NDArray[np.uint8] | None = None,
     ) -> Self:
         """Return the ground of a patch of a map.
 
@@ -50,15 +59,17 @@ class SpawnGround:
             heights: Heights of the map [m].
             solids: Solids of the map.
             patch: Row and column of the patch.
+            walls: Walls of the map, as in `TerrainMap.walls`.
         """
-        grid = config.patch_grid(*patch)
+        grid, cells = config.patch_grid(*patch), config.patch_cells(*patch)
         lower, upper = (corner[:, :2] for corner in solids.bounds())
         reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
         return cls(
             config=config,
             grid=grid,
-            heights=heights[config.patch_cells(*patch)],
+            heights=heights[cells],
             solids=solids.select(np.asarray(reaches)),
+            walls=None if walls is None else walls[cells],
         )
 
     def nearest_flat(self, position: tuple[float, float]) -> tuple[float, float, float] | None:
@@ -289,21 +300,25 @@ class SpawnGround:
         (x, y), (x0, y0), (x1, y1) = point, grid.lower, grid.upper
         return x0 + margin <= x <= x1 - margin and y0 + margin <= y <= y1 - margin
 
+    @property
+    def _wall_rule(self) -> WallRule:
+        return self.config.wall_threshold if self.walls is None else self.walls
+
     def _heights_at(self, point: tuple[float, float]) -> tuple[float, float, float]:
         """Return the lowest height of a disk, the height at its center and the highest [m]."""
-        threshold = self.config.wall_threshold
-        heights = self.heights
+        heights, rule = self.heights, self._wall_rule
         index, radius = _sample_index(self.grid, point), self.config.spawn_radius / self.grid.cell
         low, high = _height_range(heights, index, radius)
         if low == high:
             return low, high, high
-        surface = surface_at(heights, np.array([index]), rule=threshold)
+        surface = surface_at(heights, np.array([index]), rule=rule)
         z = float(surface.height[0])
         if radius <= 1:
             first = (max(0, math.floor(p - radius)) for p in index)
             last = (math.floor(p + radius) + 2 for p in index)
-            quads = heights[tuple(map(slice, first, last))]
-            rise = radius * float(_slopes(quads, threshold).max(initial=0.0))
+            quads = tuple(map(slice, first, last))
+            own = rule[quads] if isinstance(rule, np.ndarray) else rule
+            rise = radius * float(_slopes(heights[quads], own).max(initial=0.0))
             low, high = max(low, z - rise), min(high, z + rise)
         return low, z, high
 
@@ -334,7 +349,7 @@ class SpawnGround:
             np.maximum(high, cv2.dilate(heights, kernel)[inside], out=high)
         if radius <= 1:
             # The disk is within the four quads around the sample, and the margin is two cells.
-            slopes = _slopes(heights, self.config.wall_threshold)[1:-1, 1:-1]
+            slopes = _slopes(heights, self._wall_rule)[1:-1, 1:-1]
             along_x = np.maximum(slopes[:-1], slopes[1:])
             rise = np.float32(radius) * np.maximum(along_x[:, :-1], along_x[:, 1:])
             z = heights[inside]
@@ -379,12 +394,12 @@ def _reaches_disk(
     return np.asarray(beyond_x**2 + beyond_y**2 <= radius**2)
 
 
-def _slopes(heights: NDArray[np.float32], threshold: float) -> NDArray[np.float32]:
+def _slopes(heights: NDArray[np.float32], rule: WallRule) -> NDArray[np.float32]:
     """Return the steepest slope between four samples [m per cell], infinite at a wall.
 
     Args:
         heights: Samples [m], shape (nx, ny).
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        rule: Which edges between neighboring samples are walls.
 
     Returns:
         Slopes, shape (nx - 1, ny - 1).
@@ -392,8 +407,9 @@ def _slopes(heights: NDArray[np.float32], threshold: float) -> NDArray[np.float3
     x, y = (np.abs(np.diff(heights, axis=axis)) for axis in (0, 1))
     # The quad is two triangles: the first has its lower edge and its right edge.
     slopes = np.maximum(np.hypot(x[:, :-1], y[1:]), np.hypot(x[:, 1:], y[:-1]))
-    edges = np.maximum(np.maximum(x[:, :-1], x[:, 1:]), np.maximum(y[:-1], y[1:]))
-    return np.where(edges > threshold, np.float32(np.inf), slopes)
+    walls_x, walls_y = wall_edges(heights, rule)
+    has_wall = walls_x[:, :-1] | walls_x[:, 1:] | walls_y[:-1] | walls_y[1:]
+    return np.where(has_wall, np.float32(np.inf), slopes)
 
 
 def _rounded_up(value: float) -> float:

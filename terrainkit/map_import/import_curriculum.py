@@ -23,6 +23,7 @@ from terrainkit.features.gradient_noise import edge_weights
 from terrainkit.files.memory import check_memory
 from terrainkit.files.suffix import modules_by_suffix
 from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.walls import file_walls
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.height_source import Source, open_source
 from terrainkit.importing.import_options import ImportOptions
@@ -216,7 +217,10 @@ def _import_patch(
     heights = ((made.heights - level) * weights).astype(np.float32)
     solids = made.solids.transform(np.eye(3), (0.0, 0.0, -level))
     with prefixed_errors(f"{path}: "):
-        placed = place_on_flattest(config, heights, solids, imported.holes, (0, 0), center[0, 0])
+        walls = file_walls(heights, config.wall_threshold)
+        placed = place_on_flattest(
+            config, heights, solids, walls, imported.holes, (0, 0), center[0, 0]
+        )
     spawns, tolerance = placed
     config = replace(config, spawn_tolerance=tolerance)
     made = replace(made, config=config, heights=heights, solids=solids, spawns=spawns[None, None])
@@ -271,7 +275,10 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
         types[index] = list(terrains).index(path)
         tolerances[index] = made.config.spawn_tolerance
     config = relaxed_config(config, tolerances, relax=options.spawn_tolerance is None)
-    made = import_map.assemble_map(config, heights, Solids.concatenate(solids), spawns, types)
+    walls = file_walls(heights, config.wall_threshold)
+    made = import_map.assemble_map(
+        config, heights, Solids.concatenate(solids), spawns, types, walls
+    )
     if cliffs := PatchEdges(terrain_map=made).cliffs():
         text = f"cliffs between patches: {cliffs_text(cliffs, made.patch_names)}"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)

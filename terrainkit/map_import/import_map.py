@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.geometry.solids import Solids
-from terrainkit.geometry.walls import steps_of_one_cell, wall_edges
+from terrainkit.geometry.walls import count_walls, file_walls
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.ground_friction import read_friction
 from terrainkit.importing.height_source import Source, fill_missing, open_source
@@ -157,14 +157,13 @@ def make_map(
     friction = read_friction(options, source, x, y)
     yield None
     relax = options.spawn_tolerance is None
-    config, spawns = place_spawns(config, heights, solids, holes, spawn_xy, relax=relax)
-    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
-    if terrain_map.walls is not None:
-        rules = config.wall_threshold, terrain_map.walls
-        steep, walls = (
-            sum(int(edges.sum()) for edges in wall_edges(heights, rule)) for rule in rules
-        )
-        counts |= {"num_walls": walls, "num_steep_slopes": steep - walls}
+    walls = file_walls(heights, config.wall_threshold)
+    config, spawns = place_spawns(config, heights, solids, walls, holes, spawn_xy, relax=relax)
+    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, walls, friction)
+    if walls is not None:
+        num_walls = count_walls(heights, walls)
+        num_steep = count_walls(heights, config.wall_threshold)
+        counts |= {"num_walls": num_walls, "num_steep_slopes": num_steep - num_walls}
     counts["num_missing"] = int(np.isnan(found).sum())
     yield None
     report = make_report(terrain_map, source, origin, columns, holes, **counts)
@@ -260,6 +259,7 @@ def assemble_map(
     solids: Solids,
     spawns: NDArray[np.object_],
     terrain_types: NDArray[np.int32],
+    walls: NDArray[np.uint8] | None,
     friction: NDArray[np.float32] | None = None,
 ) -> TerrainMap:
     """Return a map of mode custom, whose difficulty is the rank by measured difficulty.
@@ -270,6 +270,7 @@ def assemble_map(
         solids: Solids of the map.
         spawns: Spawn positions of each patch, as `place_spawns` returns them.
         terrain_types: Sub-terrain of each patch, shape (rows, cols).
+        walls: Walls of the map, as in `TerrainMap.walls`.
         friction: Friction coefficients of the ground on the samples of the map; None for the
             default.
     """
@@ -283,14 +284,11 @@ def assemble_map(
         start = float(spawns[row, col][0, 2])
         measured[row, col] = measured_difficulty(block, config.cell, start)
     rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
-    walls = steps_of_one_cell(heights, config.wall_threshold)
-    edges = zip(wall_edges(heights, walls), wall_edges(heights, config.wall_threshold), strict=True)
-    is_as_usual = all(np.array_equal(own, steep) for own, steep in edges)
     return TerrainMap(
         config=config,
         grid=config.grid,
         heights=heights,
-        walls=None if is_as_usual else walls,
+        walls=walls,
         friction=np.broadcast_to(np.float32(config.static_friction), heights.shape)
         if friction is None
         else friction,

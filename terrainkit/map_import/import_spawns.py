@@ -24,6 +24,7 @@ def place_spawns(
     config: MapConfig,
     heights: NDArray[np.float32],
     solids: Solids,
+    walls: NDArray[np.uint8] | None,
     holes: NDArray[np.bool_],
     spawn_xy: NDArray[np.float64],
     *,
@@ -35,6 +36,7 @@ def place_spawns(
         config: Configuration of the map.
         heights: Heights of the map [m].
         solids: Solids of the map.
+        walls: Walls of the map, as in `TerrainMap.walls`.
         holes: Samples where no robot starts.
         spawn_xy: Preferred spawn position of each patch, shape (rows, cols, 2) [m].
         relax: As of `relaxed_config`.
@@ -49,7 +51,7 @@ def place_spawns(
     spawns = np.empty((config.rows, config.cols), dtype=object)
     tolerances = {}
     for patch in np.ndindex(spawns.shape):
-        placed = place_on_flattest(config, heights, solids, holes, patch, spawn_xy[patch])
+        placed = place_on_flattest(config, heights, solids, walls, holes, patch, spawn_xy[patch])
         spawns[patch], tolerances[patch] = placed
     return relaxed_config(config, tolerances, relax=relax), spawns
 
@@ -58,6 +60,7 @@ def place_on_flattest(
     config: MapConfig,
     heights: NDArray[np.float32],
     solids: Solids,
+    walls: NDArray[np.uint8] | None,
     holes: NDArray[np.bool_],
     patch: Index,
     spawn_xy: NDArray[np.float64],
@@ -71,6 +74,7 @@ def place_on_flattest(
         config: Configuration of the map.
         heights: Heights of the map [m].
         solids: Solids of the map.
+        walls: Walls of the map, as in `TerrainMap.walls`.
         holes: Samples where no robot starts.
         patch: Row and column of the patch.
         spawn_xy: Preferred spawn position, x and y [m].
@@ -81,7 +85,7 @@ def place_on_flattest(
     Raises:
         ConfigError: if the patch has no free disk.
     """
-    ground = SpawnGround.of_map(config, heights, solids, patch)
+    ground = SpawnGround.of_map(config, heights, solids, patch, walls)
     ground = replace(ground, holes=holes[config.patch_cells(*patch)])
     # In single precision as in a map, so that an edit keeps the position.
     x, y = spawn_xy.astype(np.float32).tolist()

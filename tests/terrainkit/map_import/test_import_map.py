@@ -7,7 +7,13 @@ import pytest
 import trimesh
 
 import terrainkit as tk
-from terrainkit.errors import ConfigError, HeightFileError, MapFileError, MemoryLimitError
+from terrainkit.errors import (
+    ConfigError,
+    HeightFileError,
+    MapFileError,
+    MemoryLimitError,
+    TerrainkitWarning,
+)
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
 from terrainkit.map.import_report import ImportReport
@@ -464,6 +470,15 @@ def test_a_slope_above_the_threshold_stays_a_slope_in_every_view(tmp_path):
     assert (loaded.walls > 0).sum() == 40
     assert tk.TerrainMap.load(tmp_path / "map.npz").edited(heights=loaded.heights).walls is None
     assert loaded.patch(0, 0).walls.shape == loaded.heights.shape
+
+
+def test_a_robot_starts_on_the_ground_of_a_steep_slope(tmp_path):
+    heights = np.tile(0.12 * np.arange(80)[:, None], 60)
+    with pytest.warns(TerrainkitWarning, match="no free disk"):
+        made = import_array(tmp_path, heights).terrain_map
+    x, y, z = made.env_origins[0, 0].tolist()
+    assert made.height((x, y)) == pytest.approx(z, abs=1e-4)
+    assert [str(issue) for issue in validate(made)] == []
 
 
 def test_walls_are_stored_only_where_the_threshold_would_differ(tmp_path):
