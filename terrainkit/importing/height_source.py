@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 MAX_FILE_BYTES = 1 << 30
 """Largest file that is read [bytes]."""
 
-
 _CONVERTERS = Path(__file__).with_name("converters.toml")
 """The suffixes that programs convert, by the name of the program."""
 
@@ -100,12 +99,15 @@ def open_source(path: Path, options: ReadOptions) -> Source:
         HeightFileError: if there is no reader for its suffix, or it cannot be read.
         ConfigError: if an option is missing or does not apply to the file.
     """
-    for converter, suffixes in parse_toml(read_text(_CONVERTERS)).items():
-        if path.suffix.lower() in suffixes.split():
-            raise HeightFileError(
-                f"{path}: no reader for {path.suffix!r}; convert it with {converter}"
-            )
-    reader = find_module(path, "terrainkit.importing", "reader", HeightFileError)
+    try:
+        reader = find_module(path, "terrainkit.importing", "reader", HeightFileError)
+    except HeightFileError:
+        for converter, suffixes in parse_toml(read_text(_CONVERTERS)).items():
+            if path.suffix.lower() in suffixes.split():
+                raise HeightFileError(
+                    f"{path}: no reader for {path.suffix!r}; convert it with {converter}"
+                ) from None
+        raise
     check_file(path)
     source: Source = reader.read(path, options)
     return source
