@@ -171,13 +171,17 @@ class NearGeoms:
         return np.flatnonzero(((self._first <= square) & (square <= self._last)).all(axis=1))
 
 
+def collides(model: Any) -> NDArray[np.bool_]:
+    """Return which geoms of a MuJoCo model collide, shape (ngeom,)."""
+    return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+
+
 def _map_geoms(model: Any) -> NDArray[np.int64]:
     """Return the static geoms that collide alike: the largest such group, without planes."""
     import mujoco
 
-    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     is_plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    geoms = np.flatnonzero(collides & ~is_plane & (model.geom_bodyid == 0))
+    geoms = np.flatnonzero(collides(model) & ~is_plane & (model.geom_bodyid == 0))
     if not len(geoms):
         return geoms
     contact = np.column_stack([getattr(model, name)[geoms] for name in _CONTACT])
@@ -199,8 +203,7 @@ def reach(model: Any, base: int) -> float:
         moved = moved + 2 * np.linalg.norm(model.jnt_pos[joints], axis=1)
         own = np.linalg.norm(model.body_pos[body]) + moved.sum()
         distance[body] = distance[model.body_parentid[body]] + own
-    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    geoms = np.flatnonzero(collides & (model.body_rootid[model.geom_bodyid] == base))
+    geoms = np.flatnonzero(collides(model) & (model.body_rootid[model.geom_bodyid] == base))
     extents = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
     return float((distance[model.geom_bodyid[geoms]] + extents).max(initial=0))
 

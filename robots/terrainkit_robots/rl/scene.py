@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.integrations.near_geoms import NearGeoms
+from terrainkit.integrations.near_geoms import NearGeoms, collides
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.simulation.geoms import collides, lowest_point
+from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 

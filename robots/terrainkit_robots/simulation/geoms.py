@@ -1,15 +1,10 @@
-"""Geoms of a MuJoCo model: which collide, and where they are."""
+"""Where the geoms of a MuJoCo model are."""
 
 from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-
-def collides(model: Any) -> NDArray[np.bool_]:
-    """Return which geoms of a MuJoCo model collide, shape (ngeom,)."""
-    return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
 
 
 def box_corners(model: Any, data: Any, geoms: NDArray[np.int64]) -> NDArray[np.float64]:

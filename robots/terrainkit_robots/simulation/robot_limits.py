@@ -8,8 +8,9 @@ import numpy as np
 
 from terrainkit.errors import ConfigError, one_line
 from terrainkit.feasibility.crossing_limits import RobotLimits
+from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.geoms import box_corners, collides
+from terrainkit_robots.simulation.geoms import box_corners
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.simulation.gain import Gain
-from terrainkit_robots.simulation.geoms import collides
 from terrainkit_robots.simulation.sim_model import SimModel
 
 _MAX_CONTACTS = 300

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
@@ -20,7 +21,7 @@ from terrainkit_robots.analysis.simulator_conventions.loading import (
 )
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
-from terrainkit_robots.simulation.geoms import collides, lowest_point
+from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import check_contacts, check_dofs, has_diverged
 
