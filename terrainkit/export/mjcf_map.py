@@ -277,13 +277,11 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
 
 def _is_flat(terrain_map: "TerrainMap") -> bool:
     """Return whether all cells are flat, band by band: most maps have a slope in an early one."""
-    heights, grid = terrain_map.heights, terrain_map.grid
+    heights, grid, rule = terrain_map.heights, terrain_map.grid, terrain_map.wall_rule
     for start in range(0, len(heights), ROWS_PER_BAND):
         band = heights[start : start + ROWS_PER_BAND + 1]  # the next one repeats the last row
-        rule = terrain_map.wall_rule
-        if isinstance(rule, np.ndarray):
-            rule = rule[start : start + ROWS_PER_BAND + 1]
-        nodes = NodeGrid.from_heights(band, replace(grid, shape=band.shape), rule)
+        own = rule[start : start + ROWS_PER_BAND + 1] if isinstance(rule, np.ndarray) else rule
+        nodes = NodeGrid.from_heights(band, replace(grid, shape=band.shape), own)
         if not flat_cells(nodes).all():
             return False
     return True

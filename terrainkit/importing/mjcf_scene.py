@@ -31,8 +31,7 @@ _MANY_GEOMS = (1000, 5000)
 def read(path: Path, options: ReadOptions) -> MeshSource:
     """Return the fixed geoms that collide as a mesh, with z up and in meters.
 
-    Bodies with joints, such as robots, are removed. Planes end 2 m beyond the other
-    geoms.
+    Bodies with joints, such as robots, are removed. Planes end 2 m beyond the other geoms.
 
     Args:
         path: The scene, or a world or model of Gazebo; MuJoCo opens the files that it refers to.

@@ -156,9 +156,9 @@ class LeggedRunner(OnPolicyRunner):
         symmetry = getattr(self.alg, "symmetry", None)
         if symmetry:
             self.alg.update = mirrored_update(env, self.alg)
-        if symmetry and not symmetry.use_mirror_loss:
-            # rsl-rl runs the actor once more in each mini-batch, only to log this loss.
-            symmetry.compute_loss = lambda *_: torch.zeros(())
+            if not symmetry.use_mirror_loss:
+                # rsl-rl runs the actor once more in each mini-batch, only to log this loss.
+                symmetry.compute_loss = lambda *_: torch.zeros(())
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
         """Train for some iterations, with the first episodes cut to random lengths if requested."""
