@@ -191,6 +191,10 @@ def import_in_process(monkeypatch):
     """Read files in this process: trimesh takes most of a second to import."""
     monkeypatch.setattr(child_process, "ChildProcess", ProcessStandIn)
     monkeypatch.setattr(sandbox, "forbid_changes", lambda: True)  # for good
+    before = dict(os.environ)
     yield
+    # Decoders set variables for the child process, which commands of later tests would inherit.
+    for name in os.environ.keys() - before.keys():
+        del os.environ[name]
     if "mujoco" in sys.modules:  # the child process does not restore it
         sys.modules["mujoco"].set_mju_user_warning(None)
