@@ -166,6 +166,9 @@ class Geometry:
     condim: int = 3
     """Dimension of the contact space: 1 without friction; MJCF only."""
 
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Further attributes of its contacts, such as solref, as MuJoCo writes them; MJCF only."""
+
     @property
     def contacts(self) -> bool:
         """Whether the geometry can collide with anything."""
@@ -185,6 +188,9 @@ class Link:
     virtual: bool = False
     """Whether the link has no element of its own, because it lies between two joints of one MJCF
     body."""
+
+    gravity_compensation: float = 0.0
+    """Share of its weight that MuJoCo cancels; MJCF only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,6 +223,65 @@ class Mimic:
 
     multiplier: float = 1.0
     offset: float = 0.0
+
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Further attributes of the constraint, such as solref, as MuJoCo writes them; MJCF only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling:
+    """Constraint that makes a joint or tendon a polynomial of another one; MJCF only."""
+
+    kind: Literal["joint", "tendon"]
+
+    follower: str
+    """Name of the joint or tendon."""
+
+    target: str
+    """Name of the other joint or tendon; empty to hold the follower."""
+
+    coefficients: tuple[float, ...]
+    """Coefficients of the powers 0 to 4 of the position of the target."""
+
+    settings: Mapping[str, str]
+    """Further attributes of the constraint, such as solref, as MuJoCo writes them."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Loop:
+    """Constraint that closes a kinematic loop: two frames on two links coincide."""
+
+    name: str
+    """Unique name."""
+
+    kind: Literal["connect", "weld"]
+    """Whether only the origins of the frames coincide, or their orientations as well."""
+
+    links: tuple[str, str]
+    """Names of the links."""
+
+    origins: tuple[Matrix, Matrix]
+    """Pose of the frame in each link, shape (4, 4) [m]."""
+
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Further attributes of the constraint, such as solref, as MuJoCo writes them."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tendon:
+    """Tendon that acts on joints, or passes through points of links; MJCF only."""
+
+    name: str
+    """Unique name."""
+
+    joints: Mapping[str, float]
+    """Coefficient of each joint; empty for a tendon through points."""
+
+    points: tuple[tuple[str, Matrix] | float, ...]
+    """Link and pose of each point in the link, shape (4, 4) [m], and divisors of pulleys."""
+
+    settings: Mapping[str, str]
+    """Further attributes, such as stiffness, as MuJoCo writes them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,6 +373,15 @@ class Joint:
 
     armature: float = 0.0
     """Reflected rotor inertia [kg m2] or [kg]; MJCF only."""
+
+    stiffness: float = 0.0
+    """Stiffness of its spring [N m/rad] or [N/m]; MJCF only."""
+
+    spring_reference: float = 0.0
+    """Position at which the spring has no force [rad] or [m]; MJCF only."""
+
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Further attributes of its limits and friction, as MuJoCo writes them; MJCF only."""
 
     dont_collapse: bool = False
     """Whether the URDF tells Isaac Gym not to merge the child of this fixed joint."""
@@ -458,6 +532,18 @@ class RobotModel:
 
     excluded: frozenset[frozenset[str]] = frozenset()
     """Pairs of links whose contacts are disabled; MJCF only."""
+
+    loops: tuple[Loop, ...] = ()
+    """Constraints that close kinematic loops."""
+
+    couplings: tuple[Coupling, ...] = ()
+    """Constraints of joints that are not the mimic of a joint; MJCF only."""
+
+    tendons: tuple[Tendon, ...] = ()
+    """Tendons; MJCF only."""
+
+    left_out: tuple[str, ...] = ()
+    """Constraints and tendons of the file that the model does not have, one phrase each."""
 
     problems: tuple[Problem, ...] = ()
     """What could not be read."""

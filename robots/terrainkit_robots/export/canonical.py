@@ -78,6 +78,14 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
         links = [replace(link, name=new_name) if link.name == WORLD else link for link in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
     imu = facts.model.imu
+    moving = {before for joint, before in joints if joint.moves}
+    tendons = tuple(
+        tendon
+        for tendon in facts.model.tendons
+        if moving.issuperset(tendon.joints)
+        and link_names.issuperset(point[0] for point in tendon.points if isinstance(point, tuple))
+    )
+    known = {"joint": moving, "tendon": {tendon.name for tendon in tendons}}
     model = RobotModel(
         name=plain_name(facts.model),
         kind="urdf",
@@ -101,8 +109,20 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
         },
         imu=imu if imu is not None and imu[0] in link_names else None,
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
+        loops=tuple(loop for loop in facts.model.loops if link_names.issuperset(loop.links)),
+        couplings=tuple(
+            coupling
+            for coupling in facts.model.couplings
+            if known[coupling.kind].issuperset({coupling.follower, coupling.target} - {""})
+        ),
+        tendons=tendons,
         sources=facts.model.sources,
     )
+    for kind in ("loops", "couplings", "tendons"):
+        number = len(getattr(facts.model, kind)) - len(getattr(model, kind))
+        if number:
+            changes.append(f"removed {number} {kind} of links or joints that are not written")
+    changes += [f"removed {what}" for what in facts.model.left_out]
     return CanonicalRobot(model=model, changes=tuple(changes))
 
 

@@ -49,12 +49,32 @@ def merge_fixed_joints(model: RobotModel, *, keep: Collection[str] = ()) -> Merg
         if joint.child in parts_of_body:
             body, pose = frames[joint.parent]
             joints.append(replace(joint, parent=body, origin=pose @ joint.origin))
+
+    def moved(link: str, pose: Matrix) -> tuple[str, Matrix]:
+        body, origin = frames[link]
+        return body, origin @ pose
+
+    loops = []
+    for loop in model.loops:
+        ends = [moved(*end) for end in zip(loop.links, loop.origins, strict=True)]
+        (first, origin), (second, other_origin) = ends
+        if first != second:
+            loops.append(replace(loop, links=(first, second), origins=(origin, other_origin)))
+    tendons = (
+        replace(
+            tendon,
+            points=tuple(moved(*p) if isinstance(p, tuple) else p for p in tendon.points),
+        )
+        for tendon in model.tendons
+    )
     pairs = (frozenset(frames[link][0] for link in pair) for pair in model.excluded)
     merged_model = replace(
         model,
         links=tuple(_body(parts) for parts in parts_of_body.values()),
         joints=tuple(joints),
         excluded=frozenset(pair for pair in pairs if len(pair) == 2),
+        loops=tuple(loops),
+        tendons=tuple(tendons),
     )
     return MergedRobot(model=merged_model, frames=frames)
 

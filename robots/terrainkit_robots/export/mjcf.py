@@ -4,14 +4,20 @@ The base is the only body of the world, so that the file can be attached to any 
 mass: all mass is in the `inertial` of each body.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from lxml import etree
 
-from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link, RobotModel
+from terrainkit_robots.description.model import (
+    Coupling,
+    Geometry,
+    Joint,
+    Link,
+    RobotModel,
+)
 from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.text import free_name
@@ -87,13 +93,15 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     _defaults(root)
     names = _assets(root, model)
     world = etree.SubElement(root, "worldbody")
-    base = _bodies(world, model, names, extras)
+    sites = [*_unique_sites(extras), *_constraint_sites(model)]
+    base = _bodies(world, model, names, extras, sites)
     at_zero = extras.height if extras.height_at_zero is None else extras.height_at_zero
     base.set("pos", number_text([0, 0, at_zero]))
     if model.floating:
         name = free_name("root", {joint.name for joint in model.joints})
         base.insert(0, etree.Element("freejoint", name=name))
     _contact(root, extras)
+    _tendons(root, model)
     _equality(root, model)
     _actuators(root, model, extras)
     _sensors(root, extras)
@@ -211,14 +219,20 @@ def _mesh_key(geometry: Geometry) -> _MeshKey:
     return geometry.mesh.filename, tuple(geometry.mesh.scale)
 
 
-def _bodies(world: Any, model: RobotModel, meshes: Mapping[_MeshKey, str], extras: Extras) -> Any:
+def _bodies(
+    world: Any,
+    model: RobotModel,
+    meshes: Mapping[_MeshKey, str],
+    extras: Extras,
+    all_sites: Sequence[Site],
+) -> Any:
     """Write all bodies, and return the element of the base."""
     links = {link.name: link for link in model.links}
     child_joints: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in model.joints:
         child_joints[joint.parent].append(joint)
     sites: dict[str, list[Site]] = {name: [] for name in links}
-    for site in _unique_sites(extras):
+    for site in all_sites:
         sites[site.body].append(site)
     # A stack instead of recursion: a chain of links may exceed Python's limit.
     base = model.links[0]
@@ -253,13 +267,9 @@ def _body(
     for joint in joints:
         pose = pose @ joint.origin
     _place(body, pose)
-    if link.inertial is not None and link.inertial.mass:
-        _inertial(body, link.inertial)
-    elif link.collisions:
-        # MuJoCo scales the softness of contacts by the inertia at the center of mass, which would
-        # otherwise be elsewhere.
-        middle = np.mean([shape.origin[:3, 3] for shape in link.collisions], axis=0)
-        etree.SubElement(body, "inertial", pos=number_text(middle), mass="0", diaginertia="0 0 0")
+    if link.gravity_compensation:
+        body.set("gravcomp", number_text(link.gravity_compensation))
+    _inertial(body, link)
     for index, joint in enumerate(joints):
         if joint.moves:
             # The axes of all joints are in the frame of the body at zero position.
@@ -286,8 +296,17 @@ def _place(element: Any, pose: Matrix) -> None:
         element.set("quat", number_text(matrix_to_quat(pose[:3, :3])))
 
 
-def _inertial(body: Any, inertial: Inertial) -> None:
-    assert inertial.mass is not None
+def _inertial(body: Any, link: Link) -> None:
+    """Write the mass of a link; a massless link with shapes gets the center of its shapes."""
+    inertial = link.inertial
+    if inertial is None or not inertial.mass:
+        if link.collisions:
+            # MuJoCo scales the softness of contacts by the inertia at the center of mass, which
+            # would otherwise be elsewhere.
+            middle = np.mean([shape.origin[:3, 3] for shape in link.collisions], axis=0)
+            text = number_text(middle)
+            etree.SubElement(body, "inertial", pos=text, mass="0", diaginertia="0 0 0")
+        return
     inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
     rotation = inertial.origin[:3, :3]
     i = rotation @ inertia @ rotation.T
@@ -318,6 +337,11 @@ def _joint(body: Any, joint: Joint, frame: Matrix, actuator: ActuatorConfig | No
     armature = joint.armature if actuator is None else actuator.armature
     if armature:
         element.set("armature", number_text(armature))
+    if joint.stiffness:
+        element.set("stiffness", number_text(joint.stiffness))
+    if joint.spring_reference:  # also without a spring: tendons take their length from it
+        element.set("springref", number_text(joint.spring_reference))
+    element.attrib.update(joint.settings)
 
 
 def _geom(body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str]) -> Any:
@@ -333,6 +357,7 @@ def _geom(body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str])
         for attribute in ("contype", "conaffinity"):
             if getattr(shape, attribute) != 1:
                 geom.set(attribute, str(getattr(shape, attribute)))
+        geom.attrib.update(shape.settings)
     elif shape.color is not None:
         geom.set("rgba", number_text(shape.color))
     return geom
@@ -354,19 +379,59 @@ def _contact(root: Any, extras: Extras) -> None:
             etree.SubElement(contact, "exclude", body1=first, body2=second)
 
 
+def _constraint_sites(model: RobotModel) -> Iterator[Site]:
+    """Yield the sites of the ends of loops and of the points of tendons."""
+    for loop in model.loops:
+        for number, end in enumerate(zip(loop.links, loop.origins, strict=True), 1):
+            yield Site(name=f"{loop.name}_{number}", body=end[0], pose=end[1])
+    for tendon in model.tendons:
+        for number, point in enumerate(tendon.points, 1):
+            if isinstance(point, tuple):
+                yield Site(name=f"{tendon.name}_{number}", body=point[0], pose=point[1])
+
+
 def _equality(root: Any, model: RobotModel) -> None:
-    mimic_joints = [joint for joint in model.joints if joint.mimic is not None]
-    if mimic_joints:
-        equality = etree.SubElement(root, "equality")
-        for joint in mimic_joints:
-            assert joint.mimic is not None
-            etree.SubElement(
-                equality,
-                "joint",
-                joint1=joint.name,
-                joint2=joint.mimic.joint,
-                polycoef=number_text([joint.mimic.offset, joint.mimic.multiplier, 0, 0, 0]),
-            )
+    equality = etree.SubElement(root, "equality")
+    followers = [
+        Coupling(
+            kind="joint",
+            follower=joint.name,
+            target=joint.mimic.joint,
+            coefficients=(joint.mimic.offset, joint.mimic.multiplier, 0, 0, 0),
+            settings=joint.mimic.settings,
+        )
+        for joint in model.joints
+        if joint.mimic is not None
+    ]
+    for coupling in (*followers, *model.couplings):
+        kind = coupling.kind
+        element = etree.SubElement(equality, kind, {f"{kind}1": coupling.follower})
+        if coupling.target:
+            element.set(f"{kind}2", coupling.target)
+        element.set("polycoef", number_text(coupling.coefficients))
+        element.attrib.update(coupling.settings)
+    for loop in model.loops:
+        # Sites keep both ends; an anchor gives the second one at the zero position only.
+        ends = {f"site{number}": f"{loop.name}_{number}" for number in (1, 2)}
+        etree.SubElement(equality, loop.kind, name=loop.name, **ends, **loop.settings)
+    if not len(equality):
+        root.remove(equality)
+
+
+def _tendons(root: Any, model: RobotModel) -> None:
+    if not model.tendons:
+        return
+    section = etree.SubElement(root, "tendon")
+    for tendon in model.tendons:
+        kind = "fixed" if tendon.joints else "spatial"
+        element = etree.SubElement(section, kind, name=tendon.name, **tendon.settings)
+        for joint, coefficient in tendon.joints.items():
+            etree.SubElement(element, "joint", joint=joint, coef=number_text(coefficient))
+        for number, point in enumerate(tendon.points, 1):
+            if isinstance(point, tuple):
+                etree.SubElement(element, "site", site=f"{tendon.name}_{number}")
+            else:
+                etree.SubElement(element, "pulley", divisor=number_text(point))
 
 
 def _actuators(root: Any, model: RobotModel, extras: Extras) -> None:

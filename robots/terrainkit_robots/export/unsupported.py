@@ -6,11 +6,8 @@ from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import parse_xml, read_bytes
 from terrainkit_robots.text import count, names
 
-_SECTIONS = ("tendon", "equality", "deformable", "extension", "custom")
+_SECTIONS = ("deformable", "extension", "custom")
 """Sections that are not exported. Sensors and actuators are generated."""
-
-_CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
-"""Contact parameters of geoms that are not exported."""
 
 
 def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
@@ -24,13 +21,6 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
             continue
         for section in _SECTIONS:
             ignored[f"<{section}>"] += sum(len(element) for element in root.iter(section))
-        ignored["stiffness of joints"] += sum(
-            _is_set(joint.get("stiffness")) for joint in root.iter("joint")
-        )
-        ignored["friction and contact parameters of geoms"] += sum(
-            any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom")
-        )
-    ignored["<equality>"] -= sum(joint.mimic is not None for joint in model.joints)
     changes = [
         f"ignored {what} ({count(number, 'element')})"
         for what, number in ignored.items()
@@ -40,7 +30,3 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
     if unused:
         changes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")
     return tuple(changes)
-
-
-def _is_set(value: str | None) -> bool:
-    return value is not None and any(word.strip("0.") for word in value.split())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.description.mjcf.tree import Node
-from terrainkit_robots.description.model import Actuator, Mimic, PositionGains, Source
+from terrainkit_robots.description.model import Actuator, PositionGains, Source
 
 if TYPE_CHECKING:
     import mujoco
@@ -172,37 +172,6 @@ def position_gains(actuators: Sequence[ActuatorData], factor: float) -> Position
         stiffness=factor * sum(actuator.stiffness or 0.0 for actuator in servos),
         damping=damping or None,
     )
-
-
-def read_mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[str, Mimic]:
-    """Return the mimic of each joint that a linear equality couples to another joint."""
-    import mujoco
-
-    joints = {joint.name: joint for joint in spec.joints}
-    mimics: dict[str, Mimic] = {}
-    for equality in spec.equalities:
-        follower, target = joints.get(equality.name1), joints.get(equality.name2)
-        tied = equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.active
-        if not tied or follower is None or target is None or not equality.name2:
-            continue
-        offset, factor, *higher = map(float, equality.data[:5])
-        if any(higher) or not (math.isfinite(offset) and math.isfinite(factor)):
-            continue
-        ends = [float(joint.ref) * _unit(joint) for joint in (follower, target)]
-        mimics[equality.name1] = Mimic(
-            source=node_of(equality).source,
-            joint=equality.name2,
-            multiplier=factor,
-            offset=offset + ends[0] - factor * ends[1],
-        )
-    return mimics
-
-
-def _unit(joint: Any) -> float:
-    import mujoco
-
-    hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
-    return math.pi / 180 if hinge and joint.compiler.degree else 1.0
 
 
 def coupled_joints(spec: "mujoco.MjSpec") -> set[str]:

@@ -15,7 +15,7 @@ The compiled value of a placeholder is the scale of the value that it replaces.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,7 @@ class CompiledBodies:
 
     Args:
         spec: The parsed spec.
-        imu: The site of the IMU, or None. Other sites are not compiled.
+        sites: The sites whose poses are needed. Others are not compiled.
         node_of: Function that returns the node of a MuJoCo element.
         report: Function that reports what MuJoCo rejects at a node.
         contents: File contents by path, which are used instead of files on disk.
@@ -65,7 +65,7 @@ class CompiledBodies:
     def __init__(
         self,
         spec: "mujoco.MjSpec",
-        imu: Any,
+        sites: Iterable[Any],
         node_of: Callable[[Any], Node],
         report: Callable[[Node, str], None],
         contents: Mapping[Path, bytes],
@@ -92,14 +92,21 @@ class CompiledBodies:
             body = stack.pop()
             self._copy_body(body)
             stack += body.bodies
-        if imu is not None:
-            self._copy_shape(imu)
+        for site in sites:
+            self._copy_shape(site)
         self._spec.compiler.degree = False
         self._spec.compiler.balanceinertia = True  # the inertia of huge geoms has rounding errors
         with quiet_mujoco():
             self._model = self._spec.compile()
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
 
     # Compiled values
+
+    def world_pose(self, body: Any) -> Matrix:
+        """Return the pose of a body in the world with all joints at their reference, (4, 4) [m]."""
+        index = self._copies[body].id
+        return _pose(self._data.xpos[index], self._data.xquat[index])
 
     def body_pose(self, body: Any) -> Matrix:
         """Return the pose of a body in its parent, shape (4, 4) [m]."""

@@ -20,9 +20,14 @@ from terrainkit_robots.description.mjcf.actuators import (
     force_limit,
     position_gains,
     read_actuators,
-    read_mimics,
 )
 from terrainkit_robots.description.mjcf.compiled_bodies import CompiledBodies, is_explicit
+from terrainkit_robots.description.mjcf.constraints import (
+    GEOM_SETTINGS,
+    JOINT_SETTINGS,
+    Constraints,
+    settings_of,
+)
 from terrainkit_robots.description.mjcf.imu import find_imu
 from terrainkit_robots.description.mjcf.inertia import (
     apply_minimums,
@@ -95,6 +100,8 @@ class _SpecReader:
         lines: Sequence[Node],
         contents: Mapping[Path, bytes],
     ) -> None:
+        import mujoco
+
         self._mjcf, self._contents = mjcf, contents
         self._spec = spec
         self._lines = lines
@@ -107,9 +114,10 @@ class _SpecReader:
         self._joint_actuators: dict[str, list[ActuatorData]] = {}
         for actuator in self._actuators:
             self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
-        self._mimics = read_mimics(spec, self._node)
         self._coupled = coupled_joints(spec)
         self._force_scales: dict[str, float] = {}
+        new_body = mujoco.MjSpec().worldbody.add_body()
+        self._new_joint, self._new_geom = new_body.add_joint(), new_body.add_geom()
         self._links = {spec.worldbody: WORLD}
         self._reported: set[str] = set()
 
@@ -119,8 +127,11 @@ class _SpecReader:
 
         imu = find_imu(self._spec)
         try:
+            sites = [imu] if imu is not None else []
+            if self._spec.equalities or self._spec.tendons:
+                sites += [site for site in self._spec.sites if site != imu]
             self._compiled = CompiledBodies(
-                self._spec, imu, self._node, self._report, self._contents
+                self._spec, sites, self._node, self._report, self._contents
             )
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
             reason, _, location = str(error).removeprefix("Error: ").partition("\n")
@@ -128,6 +139,15 @@ class _SpecReader:
             self._report(self._node_of_line(location), message)
             return model
         links, joints = self._read_bodies()
+        constraints = Constraints(
+            self._spec,
+            self._node,
+            self._links,
+            self._compiled.world_pose,
+            self._compiled.shape_pose,
+        )
+        mimics = constraints.mimics
+        joints = [replace(joint, mimic=mimics.get(joint.name)) for joint in joints]
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
         links = [replace(link, inertial=apply_minimums(link, *bounds)) for link in links]
@@ -147,6 +167,10 @@ class _SpecReader:
                 for pair in self._spec.excludes
                 if pair.bodyname1 != pair.bodyname2
             ),
+            loops=tuple(constraints.loops),
+            couplings=tuple(constraints.couplings),
+            tendons=tuple(constraints.tendons),
+            left_out=tuple(constraints.left_out),
         )
 
     def _check_euler_angles(self) -> None:
@@ -231,6 +255,7 @@ class _SpecReader:
             name=name,
             source=node.source,
             inertial=self._inertial(body, node),
+            gravity_compensation=float(body.gravcomp),
             collisions=tuple(collisions),
             visuals=tuple(visuals),
         )
@@ -280,6 +305,7 @@ class _SpecReader:
             friction=float(geom.friction[0]),
             priority=int(geom.priority),
             condim=int(geom.condim),
+            settings=settings_of(geom, self._new_geom, GEOM_SETTINGS),
         )
         mesh = self._meshes.get(geom.meshname)
         if mesh is None or not (shape == "mesh" or fitted):
@@ -358,7 +384,6 @@ class _SpecReader:
             anchor=frame[:3, 3],
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
-            mimic=self._mimics.get(joint.name),
             coupled=joint.name in self._coupled,
             dynamics=Dynamics(
                 source=node.source,
@@ -366,6 +391,9 @@ class _SpecReader:
                 friction=float(joint.frictionloss) * scale.force,
             ),
             armature=armature * scale.armature,
+            stiffness=float(np.ravel(joint.stiffness)[0]) * scale.armature,
+            spring_reference=float(joint.springref) * unit,
+            settings=settings_of(joint, self._new_joint, JOINT_SETTINGS),
             position_gains=position_gains(actuators, scale.armature),
         )
 

@@ -78,7 +78,8 @@ def test_joint_with_all_elements():
     np.testing.assert_allclose(found.origin, TURNED, atol=1e-15)
     assert (found.axis.tolist(), found.direction.tolist()) == ([0, 0, 2], [0, 0, 1])
     assert values(found.limit) == {"lower": -1, "upper": 2, "effort": 3, "velocity": 4}
-    assert values(found.mimic) == {"joint": "k", "multiplier": -2, "offset": 0.5}
+    expected = {"joint": "k", "multiplier": -2, "offset": 0.5, "settings": {}}
+    assert values(found.mimic) == expected
     assert values(found.dynamics) == {"damping": 0.1, "friction": 1}
     assert values(found.safety_controller) == {
         "k_position": 100,
@@ -93,7 +94,8 @@ def test_missing_values_of_joint():
         '<limit effort="3"/><mimic joint="k"/><dynamics damping="0.1" friction="much"/>'
     )
     assert values(found.limit) == {"lower": None, "upper": None, "effort": 3, "velocity": None}
-    assert values(found.mimic) == {"joint": "k", "multiplier": 1, "offset": 0}
+    expected = {"joint": "k", "multiplier": 1, "offset": 0, "settings": {}}
+    assert values(found.mimic) == expected
     assert (values(found.dynamics), found.friction) == ({"damping": 0.1, "friction": None}, 0)
     assert [problem.code for problem in problems] == ["XML006"]
     assert joint('<mimic joint="k" multiplier="0"/>')[0].mimic.multiplier == 0
