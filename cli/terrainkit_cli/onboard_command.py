@@ -33,8 +33,9 @@ class Onboard(Command):
     robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
     that it stands. The input file is never changed.
 
-    Exit code 0: the folder was written. 1: errors prevent that; with --strict, also if errors
-    remain in the file, the robot does not stand, or a framework was skipped. 2: a file cannot be
+    Exit code 0: the folder was written. 1: errors prevent that, or robot.xml moves differently
+    than an MJCF file; with --strict, also if errors remain in the file, the robot does not stand,
+    or a framework was skipped. 2: a file cannot be
     read or written, or an option is invalid.
     """
 
@@ -117,7 +118,10 @@ class Onboard(Command):
         warnings = _remaining_errors(result) + _warnings(result)
         for warning in warnings:
             render.note(f"warning: {self.file}: {warning}")
-        return int(self.strict and bool(warnings))
+        checks = result.verification
+        return int(
+            (self.strict and bool(warnings)) or (checks is not None and bool(checks.dynamics))
+        )
 
     def _options(self, steps: render.Steps) -> "OnboardOptions":
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (

@@ -22,6 +22,7 @@ from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import without_placeholder_efforts
+from terrainkit_robots.onboarding.source_model import with_compiled_gains
 from terrainkit_robots.spec.column import rounded_length
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
@@ -79,6 +80,8 @@ def convert(
     from terrainkit_robots.spec.provenance import with_provenance
 
     source, effort_changes = without_placeholder_efforts(report)
+    if source.model.kind == "mjcf":
+        source = with_compiled_gains(source)
     name, floating = options.name, options.floating
     if floating is None and user_spec is not None:
         floating = user_spec.floating

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.link_poses import link_poses, random_positions
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -88,8 +89,11 @@ class ReferenceKinematics:
     link_poses: Mapping[str, Matrix]
     """Pose of each link in the base frame, shape (NUM_POSES, 4, 4) [m]."""
 
+    zero: Mapping[str, float]
+    """Positions with all joints at 0, except that followers are at their offsets [rad] or [m]."""
+
     inertia: Mapping[str, float]
-    """Inertia about each joint axis with all joints at 0, by written name [kg m2] or [kg]."""
+    """Inertia about each joint axis in `zero`, by written name [kg m2] or [kg]."""
 
 
 def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinematics:
@@ -115,12 +119,14 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
         for joint in written.joints
     }
     positions = random_positions(ranges, written.joints, count=NUM_POSES, seed=0)
+    zero = {joint.name: 0.0 for joint in written.joints}
     source_positions = {renamed[name]: q for name, q in positions.items() if name in renamed}
     return ReferenceKinematics(
         mass=source.total_mass,
         base=written.bodies[0].top.name,
         positions=positions,
         link_poses=link_poses(source.bodies, source_positions, count=NUM_POSES),
+        zero=zero | {name: float(q) for name, q in mimic_positions(written.joints, zero).items()},
         inertia={n: inertias[name] for n, name in renamed.items() if name in inertias},
     )
 
@@ -147,7 +153,7 @@ def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalen
     angles = {name: float(angle.max()) for name, (_, angle) in errors.items()}
     inertias = {
         name: abs(inertia / reference.inertia[name] - 1)
-        for name, inertia in _mujoco_joint_inertia(model, list(reference.positions)).items()
+        for name, inertia in _mujoco_joint_inertia(model, reference.zero).items()
         if name in reference.inertia
     }
     link, angle_link, joint = (
@@ -194,16 +200,16 @@ def _mujoco_link_poses(model: Any, reference: ReferenceKinematics) -> dict[str, 
     return {name: poses[:, index] for index, name in enumerate([*bodies, *sites])}
 
 
-def _mujoco_joint_inertia(model: Any, joints: list[str]) -> dict[str, float]:
-    """Return the inertia about each joint axis without armature, with all joints at 0."""
+def _mujoco_joint_inertia(model: Any, positions: Mapping[str, float]) -> dict[str, float]:
+    """Return the inertia about each joint axis without armature, at positions by joint name."""
     import mujoco
 
     data = mujoco.MjData(model)
-    for name in joints:
-        data.qpos[int(model.joint(name).qposadr[0])] = 0.0
+    for name, position in positions.items():
+        data.qpos[int(model.joint(name).qposadr[0])] = position
     mujoco.mj_fwdPosition(model, data)
     row, inertias = np.zeros(model.nv), {}
-    for name in joints:
+    for name in positions:
         dof = int(model.joint(name).dofadr[0])
         mujoco.mj_mulM(model, data, row, np.eye(model.nv)[dof])
         inertias[name] = float(row[dof] - model.dof_armature[dof])

@@ -114,7 +114,13 @@ def _write_folder(
             options.gains == "train"
             or any(k.startswith("stiffness") and p.origin == "declared" for k, p in stiffness)
         )
-        verification = verify(result.report.facts, result.robot, folder, soft_gains=is_soft)
+        verification = verify(
+            result.report.facts,
+            result.robot,
+            folder,
+            soft_gains=is_soft,
+            compare_actuators=options.spec is None and options.gains == "stand",
+        )
         options.on_step("rendering pictures")
         images: dict[str, bytes] = {}
         images_error = "" if rendering else "disabled"

@@ -89,6 +89,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
     if checks.equivalences:
         yield Statement("comparison", _comparison(checks), "compared", _compare_files(checks))
+    yield from _dynamics(checks)
     yield from _standing(checks, robot)
     yield Statement("joints", _joints(robot))
     yield Statement("orders", _simulators(robot))
@@ -284,6 +285,18 @@ def _compare_files(checks: "Verification") -> str:
         f"{files} match the source: link positions within {1000 * distance:.2g} mm at {NUM_POSES} "
         f"poses, mass within {mass:.2g}"
     )
+
+
+def _dynamics(checks: "Verification") -> Iterator[Statement]:
+    if checks.dynamics is None:
+        return
+    if checks.dynamics_error:
+        text = f"not compared: {checks.dynamics_error}"
+    elif checks.dynamics:
+        text = f"robot.xml differs from the source: {'; '.join(checks.dynamics)}"
+    else:
+        text = "robot.xml has the masses, forces and constraints of the source at 30 states"
+    yield Statement("comparison", [f"Dynamics: {cell(text)}.\n"], "dynamics", text)
 
 
 def _comparison(checks: "Verification") -> Iterator[str]:

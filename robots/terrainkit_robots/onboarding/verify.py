@@ -1,7 +1,7 @@
 """Verify an onboarded robot: its files match the source, and it stands in simulation."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,11 +11,13 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
+from terrainkit_robots.onboarding.dynamics import dynamics_differences
 from terrainkit_robots.onboarding.equivalence import (
     Equivalence,
     compare_models,
     reference_kinematics,
 )
+from terrainkit_robots.onboarding.source_model import load_source
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
 
@@ -36,6 +38,12 @@ class Verification:
 
     equivalences: tuple[Equivalence, ...]
     """Differences of each file from the source."""
+
+    dynamics: tuple[str, ...] | None = None
+    """Differences of the dynamics of robot.xml from an MJCF source; None for a URDF source."""
+
+    dynamics_error: str = ""
+    """The reason why the dynamics were not compared."""
 
     standing: "StandResult | None" = None
     """Result of the standing test of scene.xml; None without legs, or with a fixed base."""
@@ -70,7 +78,12 @@ class Verification:
 
 
 def verify(
-    source: "Facts", robot: "RobotFiles", folder: Path, *, soft_gains: bool = False
+    source: "Facts",
+    robot: "RobotFiles",
+    folder: Path,
+    *,
+    soft_gains: bool = False,
+    compare_actuators: bool = True,
 ) -> Verification:
     """Compare the files of a folder with their source, and simulate the standing pose.
 
@@ -79,6 +92,7 @@ def verify(
         robot: The robot that was written.
         folder: The folder with its files.
         soft_gains: Whether the gains of the spec need not hold the pose without a policy.
+        compare_actuators: Whether the gains of the spec have to be those of an MJCF source.
 
     Raises:
         ExportError: if MuJoCo cannot load the files, or they differ from the source.
@@ -104,13 +118,22 @@ def verify(
             raise ExportError(
                 f"{equivalence.file} differs from the source: {'; '.join(equivalence.failures)}"
             )
+    verification = Verification(equivalences=equivalences)
+    if source.model.kind == "mjcf":
+        try:
+            differences = dynamics_differences(
+                load_source(source), scene_model, compare_actuators=compare_actuators
+            )
+            verification = replace(verification, dynamics=differences)
+        except CannotCheckError as error:
+            verification = replace(verification, dynamics=(), dynamics_error=str(error))
     if not robot.facts.legs or not floating:
-        return Verification(equivalences=equivalences)
+        return verification
     # A biped falls with any gains unless a policy balances it. With locked joints, the test still
     # shows that its feet carry it.
     joints_locked = not is_statically_stable(robot.facts.legs)
     if reason := why_it_balances(robot.facts):
-        return Verification(equivalences=equivalences, skipped=reason)
+        return replace(verification, skipped=reason)
     # Gains for training need not hold the pose, so a fall with them says nothing about the files.
     stand_gains = soft_gains and not joints_locked
     test = partial(
@@ -127,9 +150,9 @@ def verify(
         standing = test(gains, joints_locked=joints_locked)
         free_standing = test(spec_gains) if joints_locked or stand_gains else None
     except CannotCheckError as error:
-        return Verification(equivalences=equivalences, error=str(error))
-    return Verification(
-        equivalences=equivalences,
+        return replace(verification, error=str(error))
+    return replace(
+        verification,
         standing=standing,
         joints_locked=joints_locked,
         stand_gains=stand_gains,

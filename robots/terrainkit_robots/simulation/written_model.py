@@ -114,7 +114,7 @@ def make_written_model(facts: Facts) -> WrittenModel:
         check_mujoco_cost(facts.model)
         with quiet_mujoco():
             spec = mujoco.MjSpec.from_file(str(facts.model.file))
-            _remove_drawings(spec)
+            remove_drawings(spec)
             _add_floor(spec)
             model = spec.compile()
     except NotAttemptedError as error:
@@ -149,7 +149,7 @@ def make_written_model(facts: Facts) -> WrittenModel:
     )
 
 
-def _remove_drawings(spec: Any) -> None:
+def remove_drawings(spec: Any) -> None:
     """Remove sensors, and shapes that neither collide nor have a mass, with their meshes."""
     paired = _paired(spec)
     for element in [*spec.sensors, *spec.cameras, *spec.lights]:
