@@ -8,13 +8,13 @@ removed and listed in `changes`.
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_motion
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.description.model import (
     WORLD,
@@ -27,12 +27,10 @@ from terrainkit_robots.description.model import (
     RobotModel,
 )
 from terrainkit_robots.description.xml.document import RobotFileError
+from terrainkit_robots.export.ball_joints import with_hinges_for_balls
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +47,7 @@ class CanonicalRobot:
     """What was removed or changed, one sentence each."""
 
 
-def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRobot:
+def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobot:
     """Return a robot in canonical form.
 
     Args:
@@ -62,7 +60,10 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: got no links; expected a robot")
     changes: list[str] = []
-    original, facts = facts, with_world_base(facts, floating=floating)
+    original, facts = facts, with_hinges_for_balls(facts)
+    if facts is not original:
+        changes.append("replaced each ball joint by three hinges")
+    facts = with_world_base(facts, floating=floating)
     links = _links(facts, changes)
     joints = _joints(facts, changes)
     floating = has_floating_base(facts) if floating is None else floating
@@ -132,7 +133,7 @@ def _rename_world(joint: Joint, new_name: str) -> Joint:
     return replace(joint, parent=parent, child=new_name if joint.child == WORLD else joint.child)
 
 
-def has_floating_base(facts: "Facts") -> bool:
+def has_floating_base(facts: Facts) -> bool:
     """Return whether the base of a robot is free.
 
     It is if the file says so, if the robot has legs or wheels, or if none of its joints has limits,
@@ -150,7 +151,7 @@ def has_floating_base(facts: "Facts") -> bool:
     return not facts.joints or any(_is_wheel_or_propeller(facts, body) for body in facts.bodies)
 
 
-def _is_wheel_or_propeller(facts: "Facts", body: Body) -> bool:
+def _is_wheel_or_propeller(facts: Facts, body: Body) -> bool:
     """Return whether a body is a wheel or propeller on the base or on a steering body."""
     carrier = facts.physical_parent(body)
     if body.joint is None or carrier is None:
@@ -165,7 +166,7 @@ def plain_name(model: RobotModel) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._-") or "robot"
 
 
-def _links(facts: "Facts", changes: list[str]) -> list[Link]:
+def _links(facts: Facts, changes: list[str]) -> list[Link]:
     index = {name: place for place, name in enumerate(facts.tree.order)}
     links = [link for body in facts.bodies for link in body.links]
     links.sort(key=lambda link: index[link.name])
@@ -191,7 +192,7 @@ def has_unknown_inertia(inertial: Inertial | None) -> bool:
     )
 
 
-def _joints(facts: "Facts", changes: list[str]) -> list[tuple[Joint, str]]:
+def _joints(facts: Facts, changes: list[str]) -> list[tuple[Joint, str]]:
     """Return the joint of each link except the base, and its original name."""
     index = {name: place for place, name in enumerate(facts.tree.order)}
     base = facts.bodies[0].top.name

@@ -87,10 +87,11 @@ def test_kind_follows_limits(kind, limit, wanted, changes, robot):
     assert form.changes == changes
 
 
-def test_unsupported_joint_is_fixed(robot):
+def test_ball_joint_becomes_three_hinges(robot):
     form = to_canonical(robot(mjcf(f'<body>{MJCF_MASS}<joint name="b" type="ball"/></body>')))
-    assert [joint.kind for joint in form.model.joints] == ["fixed"]
-    assert form.changes == ("fixed b: joint type 'ball' is not supported",)
+    assert [joint.name for joint in form.model.joints] == ["b_x", "b_y", "b_z"]
+    assert [joint.axis.tolist() for joint in form.model.joints] == np.eye(3).tolist()
+    assert form.changes == ("replaced each ball joint by three hinges",)
 
 
 def test_mjcf_effort_is_that_of_actuator(robot):

@@ -1,0 +1,46 @@
+"""Replace ball joints by three hinges, since URDF has none and a policy has no quaternions."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import WORLD, Joint, Link
+
+
+def with_hinges_for_balls(facts: Facts) -> Facts:
+    """Return a robot with three hinges through one point in place of each ball joint.
+
+    They turn about x, y and z of the link, in this order. The motion is the same, except where the
+    second angle is 90 degrees. Ball joints at the world belong to the base and are kept.
+    """
+    model = facts.model
+    links: list[Link] = []
+    joints: list[Joint] = []
+    balls = {j.child: j for j in model.joints if j.kind == "ball" and j.parent != WORLD}
+    for link in model.links:
+        if link.name in balls:
+            source = balls[link.name].source
+            links += [Link(name=f"{link.name}:{a}", source=source, virtual=True) for a in "xy"]
+        links.append(link)
+    for joint in model.joints:
+        if joint.child not in balls:
+            joints.append(joint)
+            continue
+        parent = joint.parent
+        for letter, axis in zip("xyz", np.eye(3), strict=True):
+            child = joint.child if letter == "z" else f"{joint.child}:{letter}"
+            hinge = replace(
+                joint,
+                name=f"{joint.name}_{letter}",
+                kind="continuous",
+                parent=parent,
+                child=child,
+                origin=joint.origin if letter == "x" else np.eye(4),
+                axis=axis,
+            )
+            joints.append(hinge)
+            parent = child
+    if not balls:
+        return facts
+    return Facts(replace(model, links=tuple(links), joints=tuple(joints)), facts.meshes)
