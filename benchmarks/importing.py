@@ -30,7 +30,7 @@ def run() -> Iterator[tuple[str, float]]:
             import_map(Path(folder, name), options)
 
         def without_report(name: str) -> None:
-            module = "terrainkit.map_import.import_map.make_report"
+            module = "terrainkit.importing.maps.import_map.make_report"
             with mock.patch(module, return_value=ImportReport()):
                 whole(name)
 

@@ -11,7 +11,11 @@ from terrainkit.geometry.solids import Solids as Solids
 from terrainkit.geometry.solids import make_boxes as make_boxes
 from terrainkit.geometry.solids import make_cylinders as make_cylinders
 from terrainkit.geometry.solids import make_hulls as make_hulls
-from terrainkit.importing.import_options import ImportOptions as ImportOptions
+from terrainkit.importing.maps.import_curriculum import import_curriculum as import_curriculum
+from terrainkit.importing.maps.import_map import ImportedMap as ImportedMap
+from terrainkit.importing.maps.import_map import import_map as import_map
+from terrainkit.importing.maps.terrain_mesh import import_terrain_mesh as import_terrain_mesh
+from terrainkit.importing.readers.import_options import ImportOptions as ImportOptions
 from terrainkit.map.generation import generate as generate
 from terrainkit.map.import_report import ImportReport as ImportReport
 from terrainkit.map.map_config import MapConfig as MapConfig
@@ -19,10 +23,6 @@ from terrainkit.map.patch import Patch as Patch
 from terrainkit.map.patch import PatchParameters as PatchParameters
 from terrainkit.map.patch import make_patch as make_patch
 from terrainkit.map.terrain_map import TerrainMap as TerrainMap
-from terrainkit.map_import.import_curriculum import import_curriculum as import_curriculum
-from terrainkit.map_import.import_map import ImportedMap as ImportedMap
-from terrainkit.map_import.import_map import import_map as import_map
-from terrainkit.map_import.terrain_mesh import import_terrain_mesh as import_terrain_mesh
 from terrainkit.suites import Suite as Suite
 from terrainkit.suites import generate_suite as generate_suite
 from terrainkit.suites import get_suite as get_suite

@@ -225,7 +225,7 @@ def test_pipes_and_links_are_made_beside_a_scene(tmp_path, monkeypatch, surfaces
 
 
 def test_every_suffix_of_import_has_a_seed(surfaces):
-    from terrainkit import importing
+    from terrainkit.importing import readers
 
     tried = set()
     for surface in (_surface(surfaces, "imports"), _surface(surfaces, "scenes")):
@@ -234,9 +234,9 @@ def test_every_suffix_of_import_has_a_seed(surfaces):
         names += [entry["file"] for entry in surface.files]
         matched = [name for name in names if any(fnmatch(name, key) for key in surface.commands)]
         tried |= {Path(name).suffix for name in matched}
-    modules = iter_modules(importing.__path__, f"{importing.__name__}.")
-    readers = [import_module(module.name) for module in modules]
-    suffixes = {suffix for reader in readers for suffix in getattr(reader, "SUFFIXES", ())}
+    modules = iter_modules(readers.__path__, f"{readers.__name__}.")
+    imported = [import_module(module.name) for module in modules]
+    suffixes = {suffix for reader in imported for suffix in getattr(reader, "SUFFIXES", ())}
     same_reader = {".jpeg", ".dt1", ".dt2", ".xyzn", ".xyzrgb", ".usd", ".usdz", ".sdf"}
     assert suffixes - tried == same_reader
 

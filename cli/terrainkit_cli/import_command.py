@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from terrainkit.errors import ConfigError
-from terrainkit.importing.import_options import ImportOptions
+from terrainkit.importing.readers.import_options import ImportOptions
 from terrainkit.settings.type_hint import NonNegative
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath, is_map

@@ -1,8 +1,6 @@
-"""Import files of heights and meshes.
+"""Import files of heights and meshes: `readers` read files, and `maps` makes maps of them.
 
-Each module in this folder that defines `SUFFIXES` is a reader. Its function `read(path, options)`
-returns a `Source`. `terrainkit.import_map` makes a map of
-it.
+The two are layers. Terrains have readers, and a map has terrains; a map of a file is above both.
 """
 
 from importlib import import_module
@@ -12,7 +10,7 @@ __all__ = ["ImportOptions", "ImportReport", "ImportedMap", "import_map", "import
 
 
 def __getattr__(name: str) -> Any:
-    # They are in packages that import this one.
+    # They are in layers above the readers, which import this package.
     if name in __all__:
         return getattr(import_module("terrainkit"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

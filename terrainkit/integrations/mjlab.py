@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ExportError
 from terrainkit.export.mjcf_map import Collision
-from terrainkit.importing.import_options import ImportOptions
+from terrainkit.importing.maps.import_map import ImportedMap
+from terrainkit.importing.maps.terrain_mesh import import_terrain_mesh
+from terrainkit.importing.readers.import_options import ImportOptions
 from terrainkit.integrations import column_names, missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.map_import.import_map import ImportedMap
-from terrainkit.map_import.terrain_mesh import import_terrain_mesh
 
 try:
     import mujoco

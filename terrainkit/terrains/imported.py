@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.gradient_noise import fade_heights
 from terrainkit.geometry.grid import Grid
-from terrainkit.importing.height_source import check_file
-from terrainkit.importing.import_options import ReadOptions
-from terrainkit.importing.raster import Raster, read_raster
+from terrainkit.importing.readers.height_source import check_file
+from terrainkit.importing.readers.import_options import ReadOptions
+from terrainkit.importing.readers.raster import Raster, read_raster
 from terrainkit.terrain import Terrain, parameter
 from terrainkit.terrain.parameter import Range, Value
 
-_EXAMPLE = Path(__file__).parent.parent / "importing" / "example.npy"
+_EXAMPLE = Path(__file__).parent.parent / "importing" / "readers" / "example.npy"
 _EXAMPLE_CELL = 0.2
 
 
