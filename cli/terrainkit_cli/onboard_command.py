@@ -199,4 +199,7 @@ def _warnings(result: "OnboardResult") -> list[str]:
     verification = result.verification
     if verification is not None and not verification.is_stable:
         warnings.append(f"the robot does not stand: {'; '.join(verification.failures)}")
+    if verification is not None:
+        responses = (r for r in verification.responses if r.failure)
+        warnings += [f"{response.joint} {response.failure}" for response in responses]
     return warnings

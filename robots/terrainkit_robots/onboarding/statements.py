@@ -35,6 +35,7 @@ _HEADINGS = {
     "robot": "",
     "changes": "Changes",
     "standing": "Standing test",
+    "responses": "Step responses",
     "comparison": "Comparison with the source",
     "joints": "Joints",
     "orders": "Joint order by simulator",
@@ -91,6 +92,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
         yield Statement("comparison", _comparison(checks), "compared", _compare_files(checks))
     yield from _dynamics(checks)
     yield from _standing(checks, robot)
+    yield from _responses(checks)
     yield Statement("joints", _joints(robot))
     yield Statement("orders", _simulators(robot))
     yield Statement("next", _commands(result, robot))
@@ -322,6 +324,26 @@ def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement
     outcome = f"it does not stand: {'; '.join(failures)}" if failures else "it stands as well"
     line = f"With the gains below and without a policy, {cell(outcome)}.\n"
     yield Statement("standing", [line], "free", text)
+
+
+def _responses(checks: "Verification") -> Iterator[Statement]:
+    if not checks.responses:
+        return
+    failed = [f"{found.joint} {found.failure}" for found in checks.responses if found.failure]
+    rise, overshoot = (
+        max(getattr(r, n) for r in checks.responses) for n in ("rise_time", "overshoot")
+    )
+    text = (
+        f"joints reach 90 % of a step within {rise:.2g} s and overshoot by at most {overshoot:.0%}"
+    )
+    if failed:
+        text = f"NO: {names(failed, max_count=3)}"
+    rows = [("joint", "90 % after", "overshoot", "error after 1 s")]
+    for found in checks.responses:
+        numbers = f"{found.rise_time:.3g} s", f"{found.overshoot:.0%}", f"{found.error:.0%}"
+        rows.append((found.joint, *numbers))
+    intro = "Steps of 0.2 rad or 0.02 m of one target at a time, with the base held in the air.\n"
+    yield Statement("responses", (intro, *_table(rows)), "responds", text)
 
 
 def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.convert import RobotFiles
     from terrainkit_robots.simulation.gain import Gain
     from terrainkit_robots.simulation.standing import StandResult
+    from terrainkit_robots.simulation.step_response import StepResponse
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _DURATION = 5.0
@@ -45,6 +46,9 @@ class Verification:
 
     dynamics_error: str = ""
     """The reason why the dynamics were not compared."""
+
+    responses: "tuple[StepResponse, ...]" = ()
+    """How the joints that a policy moves follow a step of their targets."""
 
     standing: "StandResult | None" = None
     """Result of the standing test of scene.xml; None without legs, or with a fixed base."""
@@ -106,6 +110,7 @@ def verify(
         stand_test,
         why_it_balances,
     )
+    from terrainkit_robots.simulation.step_response import step_responses
 
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
@@ -121,7 +126,13 @@ def verify(
             raise ExportError(
                 f"{equivalence.file} differs from the source: {'; '.join(equivalence.failures)}"
             )
-    verification = Verification(equivalences=equivalences)
+    scales = robot.spec.per_joint("action_scale")
+    responses = tuple(
+        response
+        for response in step_responses(scene_model, scene_model.key_qpos[0])
+        if scales[response.joint]
+    )
+    verification = Verification(equivalences=equivalences, responses=responses)
     if source.model.kind == "mjcf":
         try:
             differences = dynamics_differences(

@@ -27,9 +27,10 @@ from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import default_task, get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.simulation.step_response import MAX_RISE_TIME, step_responses
 from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
 from terrainkit_robots.spec.robot_arrays import Robot
-from terrainkit_robots.text import count
+from terrainkit_robots.text import count, names
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of a foot above and below the ground [m], and of the base, relative to its target."""
@@ -129,6 +130,7 @@ def run_checks(
         check_stand(still_env),
         check_standing(still_env),
         check_action_scale(still_env),
+        check_step_responses(still_env),
         *check_rewards(env, trained.last_rewards if trained else {}),
         *([check_training(record)] if record else []),
         *(check_trends(trained) if trained else []),
@@ -204,6 +206,17 @@ def check_action_scale(env: LeggedEnv) -> Check:
     measured = f"{torque[worst]:.2g} of the effort of {env.robot.spec.joint_order[worst]}"
     expected = f"at most {MAX_ACTION_TORQUE:g}; action_scale in robot.toml is the factor"
     return Check("action scale", bool(torque[worst] <= MAX_ACTION_TORQUE), measured, expected)
+
+
+def check_step_responses(env: LeggedEnv) -> Check:
+    """Check that each joint that the policy moves follows a step of its target."""
+    order = env.robot.spec.joint_order
+    moved = {name for name, scale in zip(order, env.actions.scale, strict=True) if scale}
+    responses = step_responses(env.scene.model, env.scene.default_qpos)
+    failed = [f"{r.joint} {r.failure}" for r in responses if r.joint in moved and r.failure]
+    measured = names(failed, max_count=3) or f"{count(len(moved), 'joint')} follow"
+    expected = f"{MAX_RISE_TIME:g} s for 90 % of a step, with the base held"
+    return Check("joints follow their targets", not failed, measured, expected)
 
 
 def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Check]:

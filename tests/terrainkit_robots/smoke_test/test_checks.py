@@ -63,6 +63,7 @@ def test_bundled_robot_can_be_trained(biped):
         "stands for 1 s with zero action",
         "standing is not tracking",
         "action scale",
+        "joints follow their targets",
         *(f"reward {name}" for name in REWARDS if getattr(Task().rewards, name)),
         "trains for 1 iteration",
     ]
