@@ -195,12 +195,25 @@ class Facts:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
         actuated = self.joints if has_tendons else self.actuated
-        return detect_limbs(self.tree, self.bodies, actuated, self.meshes)
+        bodies = self.body_of
+        loops = [
+            (bodies[first].index, bodies[second].index)
+            for loop in self.model.loops
+            for first, second in [loop.links]
+            if first in bodies and second in bodies
+        ]
+        return detect_limbs(self.tree, self.bodies, actuated, self.meshes, loops)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """The limbs that the robot stands on. Empty for an arm, a drone or a car."""
-        return detect_legs(self.limbs, self.bodies)
+        """The limbs that the robot stands on. Empty for an arm, a drone or a car.
+
+        The user may name the feet. Those of the spec count if no legs are found without them.
+        """
+        legs = detect_legs(self.limbs, self.bodies, self.meshes, self.model.feet)
+        if legs or self.spec is None or not self.spec.feet:
+            return legs
+        return detect_legs(self.limbs, self.bodies, self.meshes, self.spec.feet)
 
     @cached_property
     def leg_bodies(self) -> frozenset[int]:

@@ -9,15 +9,14 @@ from terrainkit_robots.description.model import Joint
 
 
 def leg_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> list[Joint]:
-    """Return the joints that belong to exactly one leg.
+    """Return the joints that belong to exactly one leg, with those in its closed loops.
 
-    If some legs are named as legs, only those count. A joint that legs share, such as a waist, is
-    left out.
+    A joint that legs share, such as a waist, is left out.
     """
-    uses = Counter(joint.name for leg in legs for joint in leg.joints)
+    joints = [joint for leg in legs for joint in (*leg.joints, *leg.branches)]
+    uses = Counter(joint.name for joint in joints)
     unshared = {joint.name for joint in robot_joints(bodies) if uses[joint.name] == 1}
-    named = [leg for leg in legs if leg.limb.has_leg_names]
-    return [joint for leg in named or legs for joint in leg.joints if joint.name in unshared]
+    return [joint for joint in joints if joint.name in unshared]
 
 
 def robot_joints(bodies: Sequence[Body]) -> list[Joint]:

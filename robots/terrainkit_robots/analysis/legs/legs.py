@@ -1,18 +1,22 @@
 """Detect the legs of a robot and the role of each of their joints."""
 
 import itertools
+import math
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.contact import MAX_SOLE_DEPTH
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
-from terrainkit_robots.analysis.legs.limbs import Limb, is_branch
+from terrainkit_robots.analysis.bodies.shapes import min_height
+from terrainkit_robots.analysis.legs.limbs import MIN_LEG_SCORE, Limb, is_branch
 from terrainkit_robots.description.model import Joint
+from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
 Role = Literal["waist", "yaw", "roll", "hip", "knee", "ankle", "slide", "wheel"]
@@ -21,10 +25,6 @@ with other legs. A wheel is the last body of a leg and does not bend it."""
 
 _WAIST: Role = "waist"
 _WHEEL: Role = "wheel"
-
-# Two of three criteria: near the ground, a mirror image, names of legs.
-_MIN_LEG_SCORE = 1.5
-"""Score from which a limb counts as a leg."""
 
 _MIN_HORIZONTAL = 0.5
 """Horizontal part of an axis about which a leg may bend. Hips are tilted by up to 45 degrees."""
@@ -36,6 +36,9 @@ than out of it. A yaw joint that is tilted sideways by 30 degrees has 0.5, a til
 _MAX_IMBALANCE = 0.1
 """Gap of the two segments' difference in length to the smallest one, over the length of the leg, up
 to which a name decides which joint is the knee: the ankle of a small biped may halve its leg."""
+
+_DIGITS = 3
+"""Decimals of lengths [m] that decide between parts of a leg; smaller differences are ties."""
 
 _KNEE_NAME = re.compile(r"knee|calf|kfe|shank|tibia|shin", re.IGNORECASE)
 
@@ -57,6 +60,9 @@ class Leg:
     pitch: Matrix
     """Axis about which the leg bends, in the frame of the trunk at zero, shape (3,)."""
 
+    branches: tuple[Joint, ...] = ()
+    """Its joints in other branches, which closed loops connect to the limb."""
+
     length: float
     """Length from hip over knee and ankle to the contact, in the plane of the leg [m]."""
 
@@ -75,16 +81,32 @@ def mean_length(legs: Sequence[Leg]) -> float:
     return sum(leg.length for leg in legs) / len(legs)
 
 
-def detect_legs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Leg, ...]:
+def detect_legs(
+    limbs: Sequence[Limb], bodies: Sequence[Body], meshes: Meshes, feet: Collection[str] = ()
+) -> tuple[Leg, ...]:
     """Return the legs of a robot in the order of its bodies.
 
     Args:
         limbs: The limbs of the robot.
         bodies: The bodies, parents first.
+        meshes: Mesh files.
+        feet: Names of the feet, if the user knows them; the legs are then the limbs with these
+            links in their last bodies.
     """
     candidates = sorted(
-        (limb for limb in limbs if limb.score >= _MIN_LEG_SCORE),
-        key=lambda limb: (-limb.score, float(limb.tip[2]), -len(limb.joints)),
+        (
+            limb
+            for limb in limbs
+            if any(link.name in feet for link in bodies[limb.chain[-1]].links)
+            or (not feet and limb.score >= MIN_LEG_SCORE)
+        ),
+        # Among equal branches, the same one on both sides of the robot.
+        key=lambda limb: (
+            -limb.score,
+            round(float(limb.tip[2]), _DIGITS),
+            -len(limb.joints),
+            *(-round(math.hypot(x, y), _DIGITS) for x, y, _ in (limb.tip, limb.points[0])),
+        ),
     )
     if not candidates:
         return ()
@@ -95,10 +117,24 @@ def detect_legs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Leg, ...
             kept.append(limb)
     kept.sort(key=lambda limb: limb.chain)
     uses = Counter(index for limb in kept for index in limb.chain)
-    return tuple(_make_leg(limb, bodies, [uses[i] > 1 for i in limb.chain]) for limb in kept)
+    legs = []
+    for limb in kept:
+        leg = _make_leg(limb, bodies, [uses[i] > 1 for i in limb.chain])
+        named = [link.name for link in bodies[limb.chain[-1]].links if link.name in feet]
+        foot = named[0] if named else _foot_link(limb, bodies, meshes)
+        branches = dict.fromkeys(
+            joint
+            for other in limbs
+            if limb.linkage is not None and other.linkage == limb.linkage
+            for joint in other.joints
+            if joint not in limb.joints
+        )
+        legs.append(replace(leg, foot=foot, branches=tuple(branches)))
+    return tuple(legs)
 
 
 def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg:
+    """Return a leg without its foot."""
     moving = [i for i in limb.chain if (j := bodies[i].joint) is not None and j.moves]
     waist = sum(s for s, i in zip(shared, limb.chain, strict=True) if i in moving)
     axes = [
@@ -119,7 +155,7 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
     names = [joint.name for joint in limb.joints[waist:]]
     return Leg(
         limb=limb,
-        foot=_foot_link(limb, bodies),
+        foot="",
         roles=(
             *itertools.repeat(_WAIST, waist),
             *_roles(own, bending, path, names),
@@ -199,10 +235,12 @@ def _roles(
     return tuple(role(k) for k in range(len(axes)))
 
 
-def _foot_link(limb: Limb, bodies: Sequence[Body]) -> str:
+def _foot_link(limb: Limb, bodies: Sequence[Body], meshes: Meshes) -> str:
     """Return the link at the tip that is named a foot, or else has the lowest shape.
 
-    A frame without shapes, such as the frame of a sensor in the sole, is the last choice.
+    A frame without shapes, such as the frame of a sensor in the sole, is the last choice. Of the
+    parts of a split sole, it is the lowest one, or the one furthest from the trunk, so that the
+    feet of both sides are the same part.
     """
     body = bodies[limb.chain[-1]]
     pose = body.zero_pose
@@ -212,10 +250,23 @@ def _foot_link(limb: Limb, bodies: Sequence[Body]) -> str:
         for link, local in zip(body.links, body.poses, strict=True)
         if np.linalg.norm((pose @ local)[:3, 3] - limb.tip) <= 0.5 * distance + 0.01
     ]
-    colliding = [link for link in body.links if link.collisions]
+    places: dict[str, tuple[float, float]] = {}
+    for link in body.links:
+        shapes = [shape for shape in body.collisions if shape.link == link.name]
+        if shapes:
+            x, y, _ = np.mean([(pose @ shape.pose)[:3, 3] for shape in shapes], axis=0)
+            height = min(min_height(shape, pose, meshes) for shape in shapes)
+            places[link.name] = (round(height, _DIGITS), -round(math.hypot(x, y), _DIGITS))
+    ground = min((height for height, _ in places.values()), default=0.0)
+    touching = {name for name, (height, _) in places.items() if height <= ground + MAX_SOLE_DEPTH}
     visible = [link for link in body.links if link.visuals]
-    shaped = [link for link in near if link in colliding or link in visible]
-    candidates = shaped or colliding or visible or near or [body.top]
+    shaped = [
+        link
+        for link in body.links
+        if link.name in touching or (link in near and (link in visible or link.name in places))
+    ]
+    candidates = shaped or visible or near or [body.top]
     named = [link for link in candidates if _FOOT_NAME.search(link.name)]
-    touching = [link for link in candidates if link in colliding]
-    return (named or touching or candidates)[0].name
+    found = named or [link for link in shaped if link in near] or candidates
+    soles = [link.name for link in found if link.name in touching]
+    return min(soles, key=places.__getitem__) if soles else found[0].name

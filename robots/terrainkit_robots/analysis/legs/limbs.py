@@ -6,12 +6,12 @@ hexapods, arms, hands, drones and cars, with their own names and with meaningles
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.contact import contact_points
+from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
+from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
 from terrainkit_robots.analysis.bodies.tree import Tree
@@ -20,8 +20,15 @@ from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
-# Chosen on 39 robots, together with the scores below and `_MIN_LEG_SCORE` in legs.py: a foot near
-# the ground scores 1, or 0.5 if it is only low, a mirror image 0.5, names of legs 0.5.
+# Two of three criteria: near the ground, a mirror image, names of legs.
+MIN_LEG_SCORE = 1.5
+"""Score from which a limb counts as a leg."""
+
+_OTHER_NAME_COST = 1.0
+"""Cost of names of other limbs, if the robot stands without this one."""
+
+# Chosen on 39 robots, together with the scores: a foot near the ground scores 1, or 0.5 if it is
+# only low, a mirror image 0.5, names of legs 0.5.
 _NEAR_GROUND, _LOW = 0.12, 0.25
 """Height of a foot above the ground over the height of the robot at zero."""
 
@@ -44,9 +51,14 @@ _LEG_NAME = re.compile(
     r"|coxa|(?<!tor)(?<!con)sole|haa|hfe|kfe"
 )
 _OTHER_NAME = re.compile(
-    r"arm(?!at)|hand(?!le)|finger|thumb|wrist|elbow|shoulder|grip|palm|head|neck|tail|wheel|rotor"
-    r"|prop(?!r)|camera|mcp|knuckle|distal|index|pinky|(?<![a-z])ring(?![a-z])"
+    r"arm(?!at)|hand(?!le)|wrist|elbow|shoulder|head|neck|tail|wheel|rotor|prop(?!r)|camera"
 )
+"""Names of limbs that carry a robot only if it has too few other legs to stand on."""
+
+_FINGER_NAME = re.compile(
+    r"finger|thumb|grip|palm|mcp|knuckle|distal|index|pinky|(?<![a-z])ring(?![a-z])"
+)
+"""Names of fingers: a hand that points down is built like a robot on legs."""
 
 _HAND_NAME = re.compile(r"hand(?!le)|palm|gripper")
 """Name of a trunk whose limbs are fingers."""
@@ -79,6 +91,10 @@ class Chain:
     has_wheel: bool
     """Whether its last joint turns a wheel."""
 
+    linkage: int | None = None
+    """Number of the limb that it forms with other chains, since loops connect them. None without
+    loops."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limb(Chain):
@@ -90,9 +106,16 @@ class Limb(Chain):
     has_leg_names: bool
     """Whether more of its names suggest a leg than anything else."""
 
+    is_named_otherwise: bool
+    """Whether its names suggest another limb than a leg."""
+
 
 def detect_limbs(
-    tree: Tree, bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes
+    tree: Tree,
+    bodies: Sequence[Body],
+    actuated: Sequence[Joint],
+    meshes: Meshes,
+    loops: Sequence[tuple[int, int]] = (),
 ) -> tuple[Limb, ...]:
     """Return the limbs of a robot in the order of its bodies.
 
@@ -101,14 +124,18 @@ def detect_limbs(
         bodies: The bodies, parents first.
         actuated: Joints that an actuator moves, directly or perhaps through a tendon.
         meshes: Mesh files.
+        loops: Indices of the two bodies that each loop connects.
     """
-    leaves = _leaves(bodies, actuated, meshes)
-    if not leaves:
+    if not bodies:
         return ()
     lower, upper = _robot_bounds(bodies, meshes)
+    size = max(float(np.linalg.norm(upper - lower)), 1e-6)
+    chains = _join_loops(_chains(bodies, meshes), loops, size)
+    leaves = _leaves(chains, bodies, actuated)
+    if not leaves:
+        return ()
     ground = min(float(leaf.tip[2]) for leaf in leaves)
     height = max(float(upper[2]) - min(float(lower[2]), ground), 1e-6)
-    size = max(float(np.linalg.norm(upper - lower)), 1e-6)
     in_limbs = {index for leaf in leaves for index in leaf.chain}
     rest = min(  # the lowest point outside of the limbs, such as a pedestal or wheels
         (
@@ -128,7 +155,31 @@ def detect_limbs(
         is_arm = foot - rest > min_rise
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
-    return tuple(_make_limb(leaf, leaves, bodies, size, height_score(leaf)) for leaf in leaves)
+    return _without_needless_limbs(
+        [_make_limb(leaf, leaves, bodies, size, height_score(leaf)) for leaf in leaves], bodies
+    )
+
+
+def _without_needless_limbs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Limb, ...]:
+    """Return the limbs; those that are named otherwise are no legs unless they carry the robot.
+
+    They do if the mass is above the tips of all legs, but not above the tips of the other ones.
+    """
+    legs = [limb for limb in limbs if limb.score >= MIN_LEG_SCORE]
+    center = center_of_mass(bodies, [body.zero_pose for body in bodies])[:2]
+
+    def carry(tips: Sequence[Matrix]) -> bool:
+        polygon = convex_hull(np.reshape(tips, (-1, 3))[:, :2])
+        return len(polygon) >= 3 and margin(center, polygon) > 0
+
+    if carry([limb.tip for limb in legs]) and not carry(
+        [limb.tip for limb in legs if not limb.is_named_otherwise]
+    ):
+        return tuple(limbs)
+    return tuple(
+        replace(limb, score=limb.score - _OTHER_NAME_COST) if limb.is_named_otherwise else limb
+        for limb in limbs
+    )
 
 
 def is_branch(one: Chain, other: Chain, size: float) -> bool:
@@ -142,6 +193,8 @@ def is_branch(one: Chain, other: Chain, size: float) -> bool:
         other: Another chain.
         size: Diagonal of the robot [m].
     """
+    if one.linkage is not None and one.linkage == other.linkage:
+        return True
     shared = sum(a is b for a, b in zip(one.joints, other.joints, strict=False))
     if not shared:
         return False
@@ -163,10 +216,10 @@ def _length(limb: Chain, start: int) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -> list[Chain]:
+def _chains(bodies: Sequence[Body], meshes: Meshes) -> list[Chain]:
+    """Return the chain to each body without children."""
     parents = {body.parent for body in bodies}
-    actuated_ids = {id(joint) for joint in actuated}
-    leaves = []
+    chains = []
     for body in bodies[1:]:
         if body.index in parents:
             continue
@@ -175,11 +228,10 @@ def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
         # A wheel at the end does not bend the limb.
         has_wheel = bool(joints) and is_leg_wheel(bodies[moving[-1]], meshes)
-        driven = sum(id(joint) in actuated_ids for joint in joints[: len(joints) - has_wheel])
-        if len(joints) <= _MAX_JOINTS and driven >= 2:
+        if joints and len(joints) <= _MAX_JOINTS:
             tip = contact_points(body, body.zero_pose, meshes).mean(axis=0)
             points = [joint_axis(bodies[i], bodies[i].zero_pose)[0] for i in moving]
-            leaves.append(
+            chains.append(
                 Chain(
                     chain=tuple(chain),
                     joints=tuple(joints),
@@ -188,6 +240,45 @@ def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -
                     has_wheel=has_wheel,
                 )
             )
+    return chains
+
+
+def _join_loops(
+    chains: Sequence[Chain], loops: Sequence[tuple[int, int]], size: float
+) -> list[Chain]:
+    """Return the chains with the numbers of the limbs that loops join them to.
+
+    A loop at a waist joins no limbs: the waist carries limbs that are mirror images.
+    """
+    numbers: dict[int, int] = {}
+    for number, loop in enumerate(loops):
+        joined = {
+            k
+            for index in loop
+            if (side := [k for k, chain in enumerate(chains) if index in chain.chain])
+            and not any(_is_mirror_image(chains[a], chains[b], size) for a in side for b in side)
+            for k in side
+        }
+        before = {numbers[k] for k in joined if k in numbers}
+        joined |= {k for k, other in numbers.items() if other in before}
+        numbers |= dict.fromkeys(joined, number)
+    return [replace(chain, linkage=numbers.get(k)) for k, chain in enumerate(chains)]
+
+
+def _leaves(
+    chains: Sequence[Chain], bodies: Sequence[Body], actuated: Sequence[Joint]
+) -> list[Chain]:
+    """Return the chains with at least two actuated joints, in all of their branches together."""
+    actuated_ids = {id(joint) for joint in actuated}
+    driven: dict[int | tuple[int, ...], set[int]] = {}
+
+    def limb(chain: Chain) -> int | tuple[int, ...]:
+        return chain.chain if chain.linkage is None else chain.linkage
+
+    for chain in chains:
+        own = map(id, chain.joints[: len(chain.joints) - chain.has_wheel])
+        driven.setdefault(limb(chain), set()).update(actuated_ids.intersection(own))
+    leaves = [chain for chain in chains if len(driven[limb(chain)]) >= 2]
     # A body without mass and collision is a picture of a linkage beside the leg that it follows.
     ends = [bodies[leaf.chain[-1]] for leaf in leaves]
     solid = [leaf for leaf, end in zip(leaves, ends, strict=True) if end.mass > 0 or end.collisions]
@@ -218,7 +309,10 @@ def _make_limb(
     is_leg = [_LEG_NAME.search(name) or (leaf.has_wheel and "wheel" in name) for name in names]
     rest = [name for name, leg in zip(names, is_leg, strict=True) if not leg]
     leg_names = len(names) - len(rest)
-    other_names = sum(bool(_OTHER_NAME.search(name)) for name in rest)
+    fingers = sum(bool(_FINGER_NAME.search(name)) for name in rest)
+    other_names = fingers + sum(
+        bool(_OTHER_NAME.search(name)) and not _FINGER_NAME.search(name) for name in rest
+    )
     has_mirror_image = any(
         other is not leaf
         and _is_mirror_image(leaf, other, size)
@@ -226,10 +320,16 @@ def _make_limb(
         for other in leaves
     )
     score += 0.5 * has_mirror_image
-    is_finger = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
-    is_other = other_names > leg_names or (is_finger and not leg_names)
-    score += 0.5 if leg_names > other_names else -1.0 if is_other else 0.0
-    return Limb(**vars(leaf), score=score, has_leg_names=leg_names > other_names)
+    is_hand = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
+    is_other = other_names > leg_names
+    is_finger = (is_other and 2 * fingers > other_names) or (is_hand and not leg_names)
+    score += 0.5 * (leg_names > other_names) - _OTHER_NAME_COST * is_finger
+    return Limb(
+        **vars(leaf),
+        score=score,
+        has_leg_names=leg_names > other_names,
+        is_named_otherwise=is_other and not is_finger,
+    )
 
 
 def _is_mirror_image(one: Chain, other: Chain, size: float) -> bool:

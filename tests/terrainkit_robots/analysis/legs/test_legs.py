@@ -57,9 +57,9 @@ def scaled(text, factor):
     return re.sub(r'\b(xyz|size|radius|length|value|i[x-z]{2})="([^"]*)"', scale, text)
 
 
-def renamed(text, _):
+def renamed(text, word):
     names = re.findall(r'<(?:link|joint) name="(\w+)"', text)
-    numbers = {name: f'"part_{k}"' for k, name in enumerate(names)}
+    numbers = {name: f'"{word}_{k}"' for k, name in enumerate(names)}
     return re.sub(r'"(\w+)"', lambda match: numbers.get(match[1], match[0]), text)
 
 
@@ -73,7 +73,7 @@ def turned(text, yaw):
 @pytest.mark.parametrize(
     ("change", "value", "factor"),
     [
-        (renamed, None, 1),
+        (renamed, "part", 1),
         (turned, math.pi / 2, 1),
         (turned, math.pi, 1),
         (scaled, 0.2, 0.2),
@@ -93,6 +93,12 @@ def test_legs_do_not_depend_on_names_heading_and_size(name, change, value, facto
     assert after.stance.height == pytest.approx(factor * before.stance.height, rel=0.03)
     assert after.stance.margin == pytest.approx(factor * before.stance.margin, abs=0.02 * factor)
     assert after.legs[0].limb.has_leg_names == (change is not renamed)
+
+
+def test_limbs_that_carry_a_quadruped_are_legs_whatever_their_names_are():
+    text = bundled.urdf_path("quadruped").read_text()
+    for word in ("part", "arm", "shoulder", "wheel_head"):
+        assert len(facts(renamed(text, word)).legs) == 4, word
 
 
 BASE = link("base", box("0.5 0.3 0.1"))
@@ -177,6 +183,20 @@ def test_leg_with_toes_ends_at_the_lowest_or_best_named_one(name, z, expected):
     for toe, place in (("p_front", "-0.03 0 -0.2"), (name, f"0.03 0 {z}")):
         toes += link(toe, ball(0.01)) + joint("p1", toe, place)
     assert feet(table(p=toes)) == [expected, "q1", "r1", "s1"]
+
+
+@pytest.mark.parametrize("heights", [(0.2, 0.2), (0.2, 0.21), (0.21, 0.2)])
+def test_parts_of_split_soles_are_the_same_on_both_sides(heights):
+    parts = [TRUNK]
+    for name, order in zip("abcd", ((0, 1), (1, 0), (0, 1), (1, 0)), strict=True):
+        x, y, _ = map(float, dict(zip("abcd", ROOTS.values(), strict=True))[name].split())
+        parts += [chain(name, f"{x} {y} 0", (0.25, 0.2)).replace(ball(0.02, "0 0 -0.2"), "")]
+        for k in order:
+            place = f"{x / 10 * (1 - 2 * k)} 0 {-heights[k]}"
+            sole = f"{name}_{('front', 'rear')[k]}"
+            parts += [link(sole, ball(0.01)), joint(f"{name}1", sole, place, kind="fixed")]
+    end = "rear" if heights[1] > heights[0] else "front"
+    assert feet(facts(*parts)) == [f"{name}_{end}" for name in "abcd"]
 
 
 BALL, DRAWN, SHANK = ball(0.02), ball(0.02, kind="visual"), box("0.04 0.04 0.1", "0 0 -0.1")

@@ -98,6 +98,8 @@ def test_wheel_may_have_no_mass_or_end_a_leg():
 
 
 ARMS = at_corners("x_leg", "y_leg", "z_arm", "w_arm")
+# The mass is above four legs, and arms between them carry nothing.
+SPARE = [*at_corners("x", "y", "z", "w"), chain("arm_l", "0 0.2 0", LENGTHS)]
 LEFT = chain("a", "0 0.2 0", LENGTHS)
 
 
@@ -108,11 +110,23 @@ LEFT = chain("a", "0 0.2 0", LENGTHS)
         ([chain("leg", "0 0 0", LENGTHS)], {"leg1": 1.5}),
         (at_corners("x", "y"), {"x1": 1.5, "y1": 1.5}),
         (at_corners("x", "-", "z")[::2], {"x1": 1.5, "z1": 1.5}),
-        (ARMS, {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 0.5, "w_arm1": 0.5}),
+        (ARMS, {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 1.5, "w_arm1": 1.5}),
+        (SPARE, dict.fromkeys(("x1", "y1", "z1", "w1"), 1.5) | {"arm_l1": 0.0}),
+        (ARMS[2:], {"z_arm1": 0.5, "w_arm1": 0.5}),
         ([LEFT, chain("b", "0 -0.2 0", (0.2,) * 3)], {"a1": 1.5, "b2": 1.5}),
         ([LEFT, chain("b", "0 -0.2 0", (0.15,) * 4)], {"a1": 1.0, "b3": 1.0}),
     ],
-    ids=["one", "leg", "mirrored", "front and rear", "arms", "one more joint", "two more joints"],
+    ids=[
+        "one",
+        "leg",
+        "mirrored",
+        "front and rear",
+        "arms that carry",
+        "spare arm",
+        "arms",
+        "one more joint",
+        "two more joints",
+    ],
 )
 def test_score(parts, expected):
     assert scores(robot(*parts)) == expected
