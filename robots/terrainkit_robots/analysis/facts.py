@@ -10,6 +10,7 @@ from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
 from terrainkit_robots.analysis.inertia.inertia_repair import InertiaRepair
+from terrainkit_robots.analysis.legs.closed_loops import BodyLoop, body_loops
 from terrainkit_robots.analysis.legs.default_pose import default_positions
 from terrainkit_robots.analysis.legs.joint_roles import leg_joints, robot_joints
 from terrainkit_robots.analysis.legs.leg_model import LegModel
@@ -191,17 +192,16 @@ class Facts:
     # Legs
 
     @cached_property
+    def loops(self) -> tuple[BodyLoop, ...]:
+        """The closed loops of the bodies."""
+        return body_loops(self.model.loops, self.bodies)
+
+    @cached_property
     def limbs(self) -> tuple[Limb, ...]:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
         actuated = self.joints if has_tendons else self.actuated
-        bodies = self.body_of
-        loops = [
-            (bodies[first].index, bodies[second].index)
-            for loop in self.model.loops
-            for first, second in [loop.links]
-            if first in bodies and second in bodies
-        ]
+        loops = [loop.bodies for loop in self.loops]
         return detect_limbs(self.tree, self.bodies, actuated, self.meshes, loops)
 
     @cached_property
@@ -236,7 +236,9 @@ class Facts:
         return LegModel(
             bodies=self.bodies,
             joints=self.joints,
+            actuated={joint.name for joint in self.actuated},
             legs=self.legs,
+            loops=self.loops,
             mirror=self.mirror,
             keyframe=self.model.keyframe,
             meshes=self.meshes,

@@ -1,9 +1,10 @@
 """The facts that the standing pose and the stance are computed from."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.legs.closed_loops import BodyLoop
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.symmetry.mirror import Mirror
 from terrainkit_robots.description.model import Joint
@@ -20,7 +21,12 @@ class LegModel:
     joints: Sequence[Joint]
     """Joints with one degree of freedom, parents first."""
 
+    actuated: Collection[str]
+    """Names of the joints with an actuator."""
+
     legs: Sequence[Leg]
+
+    loops: Sequence[BodyLoop]
 
     mirror: Mirror
 

@@ -13,6 +13,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points, flat_foot_angle
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis, joint_motion
+from terrainkit_robots.analysis.legs.closed_loops import close_loops
 from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
@@ -88,7 +89,7 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     """Return the position of each moving joint in the standing pose [rad] or [m], by name.
 
     A keyframe in which the robot stands on its feet is used unchanged. Mimic joints are treated as
-    if they were free.
+    if they were free. Closed loops are closed in the end, if that is possible.
     """
     if is_standing_keyframe(robot):
         return {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
@@ -108,7 +109,11 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
             positions |= solution
             if mirror_leg is not None:
                 positions |= _mirror_solution(solution, leg, mirror_leg, signs)
-    return {joint.name: round_position(joint, positions[joint.name]) for joint in robot.joints}
+    positions = {joint.name: round_position(joint, positions[joint.name]) for joint in robot.joints}
+    if not robot.loops:
+        return positions
+    legs = {joint.name for leg in robot.legs for joint in leg.joints}
+    return close_loops(robot.loops, robot.bodies, positions, legs=legs, actuated=robot.actuated)
 
 
 def round_position(joint: Joint, position: float) -> float:

@@ -1,0 +1,140 @@
+"""Close the loops of a robot: solve for joint positions at which its connections meet."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses
+from terrainkit_robots.description.model import Joint, Loop
+from terrainkit_robots.transforms import Matrix, invert_poses
+
+_MAX_GAP = 1e-5
+"""Largest distance of the two points of a closed loop, along each axis [m]."""
+
+_MAX_STEP = 0.2
+"""Largest change of a joint in an iteration [rad] or [m]; it keeps the solution on its branch."""
+
+_ITERATIONS = 100
+
+_DIFFERENCE = 1e-6
+"""Step of the finite differences [rad] or [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyLoop:
+    """A loop in terms of bodies."""
+
+    bodies: tuple[int, int]
+    """Indices of the bodies that it connects."""
+
+    points: tuple[Matrix, Matrix]
+    """Where it connects them, in the frame of each body, shape (4,) with a last component of 1
+    [m]."""
+
+
+def body_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> tuple[BodyLoop, ...]:
+    """Return the loops between two bodies of a robot."""
+    references = {
+        body.joint.name: body.joint.reference
+        for body in bodies
+        if body.joint is not None and body.joint.moves
+    }
+    poses = body_poses(bodies, references)
+    frames = {
+        link.name: (body.index, local)
+        for body in bodies
+        for link, local in zip(body.links, body.poses, strict=True)
+    }
+    found = []
+    for loop in loops:
+        if not frames.keys() >= set(loop.links):
+            continue
+        (one, one_frame), (other, other_frame) = (frames[link] for link in loop.links)
+        points = [
+            None if anchor is None else frame @ [*anchor, 1.0]
+            for anchor, frame in zip(loop.anchors, (one_frame, other_frame), strict=True)
+        ]
+        # The point of one body is where that of the other one is.
+        to_other = invert_poses(poses[other]) @ poses[one]
+        first = invert_poses(to_other) @ points[1] if points[0] is None else points[0]
+        second = to_other @ first if points[1] is None else points[1]
+        found.append(BodyLoop(bodies=(one, other), points=(first, second)))
+    return tuple(found)
+
+
+def close_loops(
+    loops: Sequence[BodyLoop],
+    bodies: Sequence[Body],
+    positions: Mapping[str, float],
+    *,
+    legs: Collection[str],
+    actuated: Collection[str],
+) -> dict[str, float]:
+    """Return joint positions at which the loops are closed; the given ones if there are none.
+
+    The branches beside the legs follow the legs; if they cannot, all joints without an actuator
+    move.
+
+    Args:
+        loops: The loops.
+        bodies: The bodies, parents first.
+        positions: Position of each moving joint [rad] or [m], by name.
+        legs: Names of the joints of the legs.
+        actuated: Names of the joints with an actuator.
+    """
+    in_loops = {
+        index
+        for loop in loops
+        for index in set(ancestors(bodies, loop.bodies[0])) ^ set(ancestors(bodies, loop.bodies[1]))
+    }
+    joints = [
+        joint
+        for index in sorted(in_loops)
+        if (joint := bodies[index].joint) is not None and joint.moves and joint.mimic is None
+    ]
+    for held in (legs, actuated):
+        moved = [joint for joint in joints if joint.name not in held]
+        solution = _solve(loops, bodies, positions, moved)
+        if solution:
+            return {**positions, **solution}
+    return dict(positions)
+
+
+def _solve(
+    loops: Sequence[BodyLoop],
+    bodies: Sequence[Body],
+    positions: Mapping[str, float],
+    joints: Sequence[Joint],
+) -> dict[str, float]:
+    """Return the positions of some joints that close the loops, by Gauss-Newton; or none."""
+    if not joints:
+        return {}
+    q = np.array([positions[joint.name] for joint in joints])
+    ranges = [joint.range or (-np.inf, np.inf) for joint in joints]
+    lower, upper = np.transpose(ranges)
+    steps = np.vstack([np.zeros(len(joints)), _DIFFERENCE * np.eye(len(joints))])
+    for _ in range(_ITERATIONS):
+        columns = (q + steps).T
+        everything = {name: np.full(len(steps), value) for name, value in positions.items()}
+        everything |= {joint.name: column for joint, column in zip(joints, columns, strict=True)}
+        gaps = _gaps(loops, body_poses(bodies, everything))
+        if np.abs(gaps[0]).max() <= _MAX_GAP:
+            return {joint.name: float(x) for joint, x in zip(joints, q.round(5), strict=True)}
+        jacobian = (gaps[1:] - gaps[0]).T / _DIFFERENCE
+        change, *_ = np.linalg.lstsq(jacobian, -gaps[0], rcond=1e-6)
+        at_limit = ((q <= lower) & (change < 0)) | ((q >= upper) & (change > 0))
+        if at_limit.any():
+            change, *_ = np.linalg.lstsq(jacobian * ~at_limit, -gaps[0], rcond=1e-6)
+        q = np.clip(q + np.clip(change, -_MAX_STEP, _MAX_STEP), lower, upper)
+    return {}
+
+
+def _gaps(loops: Sequence[BodyLoop], poses: Sequence[Matrix]) -> Matrix:
+    """Return the vectors between the two points of each loop, shape (..., 3 * loops) [m]."""
+    gaps = [
+        (poses[loop.bodies[0]] @ loop.points[0] - poses[loop.bodies[1]] @ loop.points[1])[..., :3]
+        for loop in loops
+    ]
+    return np.concatenate(np.broadcast_arrays(*gaps), axis=-1)
