@@ -260,13 +260,11 @@ def _foot_link(limb: Limb, bodies: Sequence[Body], meshes: Meshes) -> str:
     ground = min((height for height, _ in places.values()), default=0.0)
     touching = {name for name, (height, _) in places.items() if height <= ground + MAX_SOLE_DEPTH}
     visible = [link for link in body.links if link.visuals]
-    shaped = [
-        link
-        for link in body.links
-        if link.name in touching or (link in near and (link in visible or link.name in places))
-    ]
-    candidates = shaped or visible or near or [body.top]
+    colliding = [link for link in body.links if link.name in places]
+    shaped = [link for link in near if link in colliding or link in visible]
+    ends = [link for link in body.links if link in shaped or link.name in touching]
+    candidates = (ends if shaped else colliding) or visible or near or [body.top]
     named = [link for link in candidates if _FOOT_NAME.search(link.name)]
-    found = named or [link for link in shaped if link in near] or candidates
+    found = named or shaped or candidates
     soles = [link.name for link in found if link.name in touching]
     return min(soles, key=places.__getitem__) if soles else found[0].name
