@@ -2,9 +2,16 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property, wraps
 from typing import TYPE_CHECKING, TypeVar
 
+from terrainkit_robots.analysis.bodies.base_joints import (
+    below_base,
+    find_base_joints,
+    moves_freely,
+    moves_in_plane,
+)
 from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physical_parent
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
@@ -58,10 +65,8 @@ class Facts:
         *,
         against: "Facts | None" = None,
         spec: "RobotSpec | None" = None,
+        base_joints: tuple[Joint, ...] | None = None,
     ) -> None:
-        self.model: RobotModel = model
-        """The description."""
-
         self.against: Facts | None = against
         """Another description of the same robot that this one is compared with."""
 
@@ -70,6 +75,24 @@ class Facts:
 
         self.meshes: Meshes = meshes or Meshes()
         """The mesh files. Each file is opened on first use, and only once."""
+
+        if base_joints is None:
+            base_joints = self._find_base_joints(model)
+        self.base_joints: tuple[Joint, ...] = base_joints
+        """Ordinary joints that a floating base is written as; they are no joints of the robot."""
+
+        self.model: RobotModel = replace(model, floating=True) if base_joints else model
+        """The description."""
+
+    def _find_base_joints(self, model: RobotModel) -> tuple[Joint, ...]:
+        """Return the ordinary joints of a floating base, if the robot stands on legs or is free."""
+        found = find_base_joints(build_tree(model), model) if model.floating is None else ()
+        if not found:
+            return ()
+        robot = Facts(model, self.meshes, base_joints=found)
+        is_free = moves_freely(found)
+        has_legs = bool(robot.legs) and (is_free or not moves_in_plane(robot.bodies))
+        return found if has_legs or (is_free and model.actuators) else ()
 
     @property
     def required_spec(self) -> "RobotSpec":
@@ -82,7 +105,8 @@ class Facts:
     @cached_property
     def tree(self) -> Tree:
         """The tree of links, without the joints that do not fit into a tree."""
-        return build_tree(self.model)
+        tree = build_tree(self.model)
+        return below_base(tree, self.base_joints) if self.base_joints else tree
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

@@ -58,8 +58,12 @@ def body_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> tuple[BodyLoop,
         ]
         # The point of one body is where that of the other one is.
         to_other = invert_poses(poses[other]) @ poses[one]
-        first = invert_poses(to_other) @ points[1] if points[0] is None else points[0]
-        second = to_other @ first if points[1] is None else points[1]
+        first, second = points
+        if first is None:
+            assert second is not None
+            first = invert_poses(to_other) @ second
+        if second is None:
+            second = to_other @ first
         found.append(BodyLoop(bodies=(one, other), points=(first, second)))
     return tuple(found)
 

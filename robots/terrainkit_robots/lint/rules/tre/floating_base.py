@@ -29,7 +29,7 @@ def no_free_joint(robot: Facts) -> Violations:
         MuJoCo's XML reference, body/freejoint.
     """
     model, tree = robot.model, robot.tree
-    if model.kind != "mjcf" or not tree.order:
+    if model.kind != "mjcf" or not tree.order or robot.base_joints:
         return
     root = tree.links[tree.order[0]]
     if any(
