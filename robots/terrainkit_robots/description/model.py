@@ -371,6 +371,9 @@ class Joint:
     dynamics: Dynamics | None = None
     """Damping and friction; None if the file declares neither."""
 
+    stiffness: float = 0.0
+    """Stiffness of its spring [N m/rad] or [N/m]; MJCF only."""
+
     armature: float = 0.0
     """Reflected rotor inertia [kg m2] or [kg]; MJCF only."""
 

@@ -366,7 +366,19 @@ class _SpecReader:
 
         kinds = mujoco.mjtJoint
         frame, scale = self._compiled.joint_pose(joint), self._compiled.joint_scale(joint)
-        bare = Joint(name=name, source=node.source, kind="ball", parent="", child="")
+        bare = Joint(
+            name=name,
+            source=node.source,
+            kind="ball",
+            parent="",
+            child="",
+            stiffness=float(np.ravel(joint.stiffness)[0]) * scale.armature,
+            dynamics=Dynamics(
+                source=node.source,
+                damping=float(np.ravel(joint.damping)[0]) * scale.armature,
+                friction=float(joint.frictionloss) * scale.force,
+            ),
+        )
         if joint.type == kinds.mjJNT_FREE:
             return replace(bare, kind="floating")
         if joint.type == kinds.mjJNT_BALL:
@@ -385,11 +397,6 @@ class _SpecReader:
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
             coupled=joint.name in self._coupled,
-            dynamics=Dynamics(
-                source=node.source,
-                damping=float(np.ravel(joint.damping)[0]) * scale.armature,
-                friction=float(joint.frictionloss) * scale.force,
-            ),
             armature=armature * scale.armature,
             stiffness=float(np.ravel(joint.stiffness)[0]) * scale.armature,
             spring_reference=float(joint.springref) * unit,

@@ -1,7 +1,8 @@
-"""Rules on damping, friction and armature."""
+"""Rules on damping, friction, armature and springs."""
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import names
 
 # 6 of 536 published files exceed it, with a friction of 100 %: grippers that cannot move.
 _MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.3
@@ -139,3 +140,35 @@ def excessive_armature(robot: Facts) -> Violations:
                 f"expected at least {_MIN_ACCELERATION:g} rad/s2",
                 measured={"armature": joint.armature, "acceleration": acceleration},
             )
+
+
+@rule("JNT029", "sprung-base", "warning")
+def sprung_base(robot: Facts) -> Violations:
+    """Springs or dampers act on the joints of a floating base.
+
+    They pull the robot to the origin, or brake it in the air: a policy learns to lean on forces
+    that the real robot does not have. Usually the joints inherit them from a default class that is
+    meant for the other joints.
+
+    Fix:
+        Replace the joints by <freejoint/>, which inherits nothing, or set stiffness, damping and
+        frictionloss of each of them to 0.
+
+    Source:
+        MuJoCo's XML reference, body/freejoint and joint/stiffness.
+    """
+    root = robot.bodies[0].top.name if robot.bodies else ""
+    free = [
+        joint for joint in robot.model.joints if (joint.kind, joint.child) == ("floating", root)
+    ]
+    forces = ("stiffness", "damping", "friction")
+    joints = [j for j in robot.base_joints or free if any(getattr(j, name) > 0 for name in forces)]
+    largest = {name: max((getattr(joint, name) for joint in joints), default=0) for name in forces}
+    if joints:
+        got = ", ".join(f"{name} up to {value:g}" for name, value in largest.items() if value > 0)
+        yield Violation(
+            element=joints[0],
+            message=f"forces on the base in {names(joint.name for joint in joints)}: got {got}; "
+            "expected 0",
+            measured=largest,
+        )
