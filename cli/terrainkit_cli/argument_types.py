@@ -25,6 +25,7 @@ Limits = Annotated[tuple[str, ...], option("[NAME=VALUE ...]")]
 IgnoredRules = Annotated[tuple[str, ...], option("CODES=REASON", is_repeated=True)]
 Packages = Annotated[tuple[str, ...], option("NAME=DIR", is_repeated=True)]
 XacroArguments = Annotated[tuple[str, ...], option("NAME:=VALUE", is_repeated=True)]
+Feet = Annotated[tuple[str, ...], option("LINKS", is_repeated=True)]
 
 TerrainName = Annotated[str, option("TERRAIN")]
 Device = Annotated[str, option("DEVICE")]
@@ -49,9 +50,12 @@ def split_commas(text: str) -> list[str]:
 
 
 def parse_settings(
-    ignore: Sequence[str], package: Sequence[str], xacro_arg: Sequence[str]
+    ignore: Sequence[str],
+    package: Sequence[str],
+    xacro_arg: Sequence[str],
+    feet: Sequence[str] = (),
 ) -> "Settings":
-    """Return the settings of the options --ignore, --package and --xacro-arg.
+    """Return the settings of the options --ignore, --package, --xacro-arg and --feet.
 
     Raises:
         ConfigError: if a text has another format, or names no rule or folder.
@@ -64,6 +68,7 @@ def parse_settings(
         ignore={code: reason for codes, reason in ignored.items() for code in split_commas(codes)},
         packages={name: package_folder(name, Path(folder)) for name, folder in folders.items()},
         xacro_arguments=parse_pairs("--xacro-arg", xacro_arg, ":=", "NAME:=VALUE"),
+        feet=tuple(name for names in feet for name in split_commas(names)),
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
+    Feet,
     IgnoredRules,
     InputPath,
     OutputPath,
@@ -96,6 +97,9 @@ class Onboard(Command):
     xacro_arg: XacroArguments = ()
     """Value of a xacro argument of the file."""
 
+    feet: Feet = ()
+    """Links that are the feet, comma-separated, if they are not found."""
+
     def run(self) -> int:
         """Onboard the robot and print a summary."""
         from terrainkit_robots.onboarding.pipeline import onboard
@@ -130,7 +134,7 @@ class Onboard(Command):
         from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 
         return OnboardOptions(
-            settings=parse_settings(self.ignore, self.package, self.xacro_arg),
+            settings=parse_settings(self.ignore, self.package, self.xacro_arg, self.feet),
             collision=self.collision,
             name=self.name,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
+    Feet,
     IgnoredRules,
     InputPath,
     OptionalFlag,
@@ -44,7 +45,7 @@ class CheckRobot(Command):
 
     Default options are read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot]
     in terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict, simulation.
+    feet, strict, simulation.
 
     The comment <!-- terrainkit: ignore INR004 the reason --> suppresses a rule for the element that
     contains the comment, for the elements on the same line, and for the next element.
@@ -72,6 +73,9 @@ class CheckRobot(Command):
 
     xacro_arg: XacroArguments = ()
     """Value of a xacro argument of the file."""
+
+    feet: Feet = ()
+    """Links that are the feet, comma-separated, if they are not found."""
 
     against: Annotated[str, option("FILE")] = ""
     """Compare with another file of the same robot: URDF, xacro or MJCF."""
@@ -117,8 +121,8 @@ class CheckRobot(Command):
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         settings = self._settings()
         files = self._find_files(settings)
-        if len(files) > 1 and (self.against or self.spec):
-            raise ConfigError(f"--against and --spec: got {len(files)} files; expected one")
+        if len(files) > 1 and (self.against or self.spec or self.feet):
+            raise ConfigError(f"--against, --spec and --feet: got {len(files)} files; expected one")
         if self.output:
             _check_output(self.output, [Path(name) for name in files])
         baseline = self._read_baseline()
@@ -140,7 +144,7 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.check import select_rules
 
         settings = replace(
-            parse_settings(self.ignore, self.package, self.xacro_arg),
+            parse_settings(self.ignore, self.package, self.xacro_arg, self.feet),
             select=tuple(word for words in self.select for word in split_commas(words)),
             strict=self.strict,
             simulate=self.simulation,

@@ -12,7 +12,7 @@ from terrainkit_robots.lint.runner import Report, Skipped, has_inputs, lint
 from terrainkit_robots.lint.settings import Settings, matching, read_settings
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.text import display_path
+from terrainkit_robots.text import display_path, names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,8 +150,8 @@ def check_robot(
 
     Raises:
         RobotFileError: if a file cannot be found, downloaded or opened.
-        ConfigError: if the settings name an unknown rule, `against` is not a robot, or the spec is
-            invalid.
+        ConfigError: if the settings name an unknown rule or links that end no legs, `against` is
+            not a robot, or the spec is invalid.
     """
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -168,5 +168,13 @@ def check_robot(
         other = Facts(model)
     robot_spec = RobotSpec.load(Path(spec)) if spec is not None else None
     model = load_robot(path, packages=packages, xacro_arguments=arguments, contents=contents)
+    model = replace(model, feet=settings.feet)
     facts = Facts(model, Meshes(contents), against=other, spec=robot_spec)
+    feet = {leg.foot for leg in facts.legs}
+    if wrong := [foot for foot in settings.feet if foot not in feet]:
+        ends = names(facts.bodies[limb.chain[-1]].name for limb in facts.limbs)
+        raise ConfigError(
+            f"feet: got {names(wrong)}; expected one link for each leg, at the end of a chain with "
+            f"at least two actuated joints: {ends or 'the robot has none'}"
+        )
     return lint_selected(facts, settings, contents)

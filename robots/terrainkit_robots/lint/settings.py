@@ -50,6 +50,9 @@ class Settings(Config):
     xacro_arguments: Mapping[str, str] = field(default_factory=dict, metadata={"key": "xacro-arg"})
     """Value of each xacro argument."""
 
+    feet: tuple[str, ...] = ()
+    """Links that are the feet, one for each leg; none: found by geometry."""
+
     strict: bool | None = None
     """Whether warnings count as errors in the exit code; none: no."""
 
@@ -76,6 +79,7 @@ class Settings(Config):
             ignore={**other.ignore, **self.ignore},
             packages={**other.packages, **self.packages},
             xacro_arguments={**other.xacro_arguments, **self.xacro_arguments},
+            feet=self.feet or other.feet,
             strict=other.strict if self.strict is None else self.strict,
             simulate=other.simulate if self.simulate is None else self.simulate,
         )

@@ -200,7 +200,7 @@ def _sentences(robot: "RobotFiles") -> Iterator[str]:
     if not facts.legs:
         yield (
             "No legs were found, so there are no feet, no standing pose and no spawn height, and "
-            "the rules for legs were skipped."
+            "the rules for legs were skipped. --feet names the feet of a robot with legs."
         )
         return
     feet = ", ".join(map(cell, spec.feet))

@@ -1,5 +1,6 @@
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -226,6 +227,17 @@ def test_foot_of_a_leg(shank, ends, foot):
             parts += [link(f"{name}_{end}", part, mass=None)]
             parts += [joint(b, f"{name}_{end}", f"0 0 {z}", kind="fixed")]
     assert feet(facts(*parts)) == [f"{name}_{foot}" for name in "pqrs"]
+
+
+@pytest.mark.parametrize("by_spec", [False, True])
+def test_named_feet_end_legs(by_spec):
+    # A limb that ends far above the ground is found only if its foot is named.
+    robot = facts(TRUNK, chain("a", "0 0 1", (0.2, 0.2)), chain("b", "0 0 0", (0.1,)))
+    assert robot.legs == ()
+    named = ("a1",)
+    model = robot.model if by_spec else replace(robot.model, feet=named)
+    spec = SimpleNamespace(feet=named) if by_spec else None
+    assert feet(Facts(model, spec=spec)) == ["a1"]
 
 
 def pair(lengths=(0.25, 0.2), parent="trunk", axes=()):
