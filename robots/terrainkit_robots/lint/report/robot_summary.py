@@ -25,7 +25,7 @@ def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     yield "robot", f"{data['name'] or 'unnamed'} ({kind})"
     yield "size", ", ".join(_size(data))
     if not data["legs"]:
-        yield "legs", "none detected; --feet names the feet of a robot with legs"
+        yield "legs", "none detected; --feet names feet"
     else:
         yield from _legs(data, {joint.name: joint.effort for joint in facts.joints})
     if facts.joints:

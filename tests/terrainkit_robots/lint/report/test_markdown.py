@@ -12,7 +12,7 @@ TEXT = f"""\
 |---|---|
 | robot | r (URDF) |
 | size | 0 kg, 0 links in 0 rigid bodies, 0 joints |
-| legs | none detected |
+| legs | none detected; --feet names feet |
 
 | | rule | location | finding | how to fix |
 |---|---|---|---|---|

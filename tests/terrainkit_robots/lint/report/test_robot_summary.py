@@ -36,7 +36,7 @@ def test_summary_without_legs_and_name(tmp_path):
     assert summary(tmp_path / "robot.urdf") == {
         "robot": "unnamed (URDF)",
         "size": "0 kg, 1 link in 1 rigid body, 0 joints",
-        "legs": "none detected",
+        "legs": "none detected; --feet names feet",
     }
 
 

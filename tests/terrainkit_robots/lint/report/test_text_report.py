@@ -35,7 +35,9 @@ def test_text_of_a_fixed_report(fixed_report):
 
 def test_text_of_a_report_without_findings(report):
     clean = dataclasses.replace(report, findings=(), skipped=())
-    assert to_text([clean]).endswith("none detected\n\nrobot.urdf: no problems found\n")
+    assert to_text([clean]).endswith(
+        "none detected; --feet names feet\n\nrobot.urdf: no problems found\n"
+    )
 
 
 def test_brief_report_is_one_line(report, fixed_report):
