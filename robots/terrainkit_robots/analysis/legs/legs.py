@@ -265,6 +265,8 @@ def _foot_link(limb: Limb, bodies: Sequence[Body], meshes: Meshes) -> str:
     ends = [link for link in body.links if link in shaped or link.name in touching]
     candidates = (ends if shaped else colliding) or visible or near or [body.top]
     named = [link for link in candidates if _FOOT_NAME.search(link.name)]
-    found = named or shaped or candidates
+    found = named or candidates
+    if shaped and not named and touching.isdisjoint(link.name for link in shaped):
+        found = shaped
     soles = [link.name for link in found if link.name in touching]
     return min(soles, key=places.__getitem__) if soles else found[0].name
