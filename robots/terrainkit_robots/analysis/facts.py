@@ -94,6 +94,10 @@ class Facts:
         has_legs = bool(robot.legs) and (is_free or not moves_in_plane(robot.bodies))
         return found if has_legs or (is_free and model.actuators) else ()
 
+    def with_model(self, model: RobotModel) -> "Facts":
+        """Return the facts of a changed description, with the same base."""
+        return Facts(model, self.meshes, spec=self.spec, base_joints=self.base_joints)
+
     @property
     def required_spec(self) -> "RobotSpec":
         """The robot.toml, for rules that only run with one."""

@@ -371,9 +371,6 @@ class Joint:
     dynamics: Dynamics | None = None
     """Damping and friction; None if the file declares neither."""
 
-    stiffness: float = 0.0
-    """Stiffness of its spring [N m/rad] or [N/m]; MJCF only."""
-
     armature: float = 0.0
     """Reflected rotor inertia [kg m2] or [kg]; MJCF only."""
 
@@ -535,6 +532,9 @@ class RobotModel:
 
     excluded: frozenset[frozenset[str]] = frozenset()
     """Pairs of links whose contacts are disabled; MJCF only."""
+
+    feet: tuple[str, ...] = ()
+    """Links that the user names as the feet."""
 
     loops: tuple[Loop, ...] = ()
     """Constraints that close kinematic loops."""

@@ -12,12 +12,17 @@ def with_hinges_for_balls(facts: Facts) -> Facts:
     """Return a robot with three hinges through one point in place of each ball joint.
 
     They turn about x, y and z of the link, in this order. The motion is the same, except where the
-    second angle is 90 degrees. Ball joints at the world belong to the base and are kept.
+    second angle is 90 degrees. Ball joints of the base are kept.
     """
     model = facts.model
     links: list[Link] = []
     joints: list[Joint] = []
-    balls = {j.child: j for j in model.joints if j.kind == "ball" and j.parent != WORLD}
+    base = {joint.child for joint in facts.base_joints}
+    balls = {
+        joint.child: joint
+        for joint in model.joints
+        if joint.kind == "ball" and joint.parent != WORLD and joint.child not in base
+    }
     for link in model.links:
         if link.name in balls:
             source = balls[link.name].source
@@ -43,4 +48,4 @@ def with_hinges_for_balls(facts: Facts) -> Facts:
             parent = child
     if not balls:
         return facts
-    return Facts(replace(model, links=tuple(links), joints=tuple(joints)), facts.meshes)
+    return facts.with_model(replace(model, links=tuple(links), joints=tuple(joints)))

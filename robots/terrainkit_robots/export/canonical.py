@@ -105,6 +105,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
             if joint.moves and name_before in actuated
         ),
         floating=floating,
+        feet=facts.model.feet,
         keyframe={
             name: q for name, q in facts.model.keyframe.items() if name in facts.default_pose
         },

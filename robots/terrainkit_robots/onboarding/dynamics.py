@@ -6,7 +6,7 @@ off. Joints are compared by name, and forces on the joints only, unless both bas
 
 import copy
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,19 +60,25 @@ class Side:
 
 
 def dynamics_differences(
-    source: Any, written: Any, *, compare_actuators: bool = True
+    source: Any,
+    written: Any,
+    *,
+    base_joints: Collection[str] = (),
+    compare_actuators: bool = True,
 ) -> tuple[str, ...]:
     """Return the differences of a written model from its source, one phrase each.
 
     Args:
         source: The `mujoco.MjModel` of the source.
         written: The `mujoco.MjModel` of the written file.
+        base_joints: Joints of the source that a free joint replaces.
         compare_actuators: Whether position actuators have to have the gains of the source.
     """
     import mujoco
 
     joint_names, sides = pair_models(source, written)
-    missing = [name for name in _joint_names(source) if name and name not in joint_names]
+    kept = {*joint_names, *base_joints, ""}
+    missing = [name for name in _joint_names(source) if name not in kept]
     found = [f"without the joints {names(missing, max_count=4)}"] if missing else []
     if not joint_names:
         return tuple(found)

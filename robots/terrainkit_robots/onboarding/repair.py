@@ -114,4 +114,4 @@ def without_placeholder_efforts(report: Report) -> tuple[Facts, tuple[str, ...]]
         f"the effort limit of {listed} is a placeholder ({got} N m); it was replaced by an "
         "estimate from the mass and the leg length, see [effort] in robot.toml"
     )
-    return Facts(changed, facts.meshes), (change,)
+    return facts.with_model(changed), (change,)

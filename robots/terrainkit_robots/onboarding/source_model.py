@@ -65,7 +65,7 @@ def with_compiled_gains(facts: Facts) -> Facts:
     )
     if joints == facts.model.joints:
         return facts
-    return Facts(replace(facts.model, joints=joints), facts.meshes)
+    return facts.with_model(replace(facts.model, joints=joints))
 
 
 def _compiled_joint(joint: Joint, side: Side, place: int) -> Joint:

@@ -136,7 +136,10 @@ def verify(
     if source.model.kind == "mjcf":
         try:
             differences = dynamics_differences(
-                load_source(source), scene_model, compare_actuators=compare_actuators
+                load_source(source),
+                scene_model,
+                base_joints=[joint.name for joint in source.base_joints],
+                compare_actuators=compare_actuators,
             )
             verification = replace(verification, dynamics=differences)
         except CannotCheckError as error:

@@ -8,7 +8,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses
 from terrainkit_robots.description.model import Joint, Loop
-from terrainkit_robots.transforms import Matrix, invert_poses
+from terrainkit_robots.transforms import Matrix
 
 _MAX_GAP = 1e-5
 """Largest distance of the two points of a closed loop, along each axis [m]."""
@@ -36,12 +36,6 @@ class BodyLoop:
 
 def body_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> tuple[BodyLoop, ...]:
     """Return the loops between two bodies of a robot."""
-    references = {
-        body.joint.name: body.joint.reference
-        for body in bodies
-        if body.joint is not None and body.joint.moves
-    }
-    poses = body_poses(bodies, references)
     frames = {
         link.name: (body.index, local)
         for body in bodies
@@ -51,20 +45,10 @@ def body_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> tuple[BodyLoop,
     for loop in loops:
         if not frames.keys() >= set(loop.links):
             continue
-        (one, one_frame), (other, other_frame) = (frames[link] for link in loop.links)
-        points = [
-            None if anchor is None else frame @ [*anchor, 1.0]
-            for anchor, frame in zip(loop.anchors, (one_frame, other_frame), strict=True)
-        ]
-        # The point of one body is where that of the other one is.
-        to_other = invert_poses(poses[other]) @ poses[one]
-        first, second = points
-        if first is None:
-            assert second is not None
-            first = invert_poses(to_other) @ second
-        if second is None:
-            second = to_other @ first
-        found.append(BodyLoop(bodies=(one, other), points=(first, second)))
+        (first, first_frame), (second, second_frame) = (frames[link] for link in loop.links)
+        origin, other_origin = (pose[:, 3] for pose in loop.origins)
+        points = first_frame @ origin, second_frame @ other_origin
+        found.append(BodyLoop(bodies=(first, second), points=points))
     return tuple(found)
 
 

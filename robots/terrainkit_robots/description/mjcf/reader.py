@@ -398,7 +398,6 @@ class _SpecReader:
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
             coupled=joint.name in self._coupled,
             armature=armature * scale.armature,
-            stiffness=float(np.ravel(joint.stiffness)[0]) * scale.armature,
             spring_reference=float(joint.springref) * unit,
             settings=settings_of(joint, self._new_joint, JOINT_SETTINGS),
             position_gains=position_gains(actuators, scale.armature),
