@@ -95,7 +95,7 @@ class Family:
 
 FAMILIES = {
     "XML": Family(title="XML syntax and schema", onboarding="blocks"),
-    "UNI": Family(title="units", certainty="likely"),
+    "UNI": Family(title="units", certainty="likely", onboarding="blocks"),
     "MSH": Family(title="mesh files", onboarding="blocks"),
     "TRE": Family(title="kinematic tree", onboarding="blocks"),
     "JNT": Family(title="joints"),

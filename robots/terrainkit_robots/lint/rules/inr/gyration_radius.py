@@ -40,7 +40,13 @@ _MIN_KEPT_MASS = 0.01
 published Go2 has a head of 1 g."""
 
 
-@rule("INR006", "inertia-too-large", "warning", needs=("mass-unit", "length-unit", "inertia-unit"))
+@rule(
+    "INR006",
+    "inertia-too-large",
+    "warning",
+    needs=("mass-unit", "length-unit", "inertia-unit"),
+    onboarding="blocks",
+)
 def inertia_too_large(robot: Facts) -> Violations:
     """An inertia is larger than the size of the body allows.
 
@@ -53,9 +59,9 @@ def inertia_too_large(robot: Facts) -> Violations:
         Give the inertia in kg m2 about the center of mass, and the mass in kg.
 
     Source:
-        I <= m r^2 if all mass is within r of the center of mass. A ratio above 3 is an error; it
-        occurs in a published UR5 (wrists) and Baxter (fingers), whose values belong to other parts
-        or have other units.
+        I <= m r^2 if all mass is within r of the center of mass. A ratio above 3 is an
+        error, which prevents onboarding; it occurs in a published UR5 (wrists) and Baxter
+        (fingers), whose values belong to other parts or have other units.
     """
     for link in robot.model.links:
         inertia = max_inertia(link)

@@ -155,14 +155,14 @@ def triangle_inequality(robot: Facts) -> Violations:
         )
 
 
-@rule("INR005", "placeholder-inertia", "warning")
+@rule("INR005", "placeholder-inertia", "warning", onboarding="blocks")
 def placeholder_inertia(robot: Facts) -> Violations:
     """An inertia is the identity matrix, or the same for at least half of the links.
 
     A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. Such a link resists
     rotation like a flywheel, and gains tuned on it fail on the real robot. Identical parts, such as
-    four wheels, may have the same inertia; a thigh and a shank do not. It is an error if
-    INR006 would be one, which it replaces.
+    four wheels, may have the same inertia; a thigh and a shank do not. It is an error, which
+    prevents onboarding, if INR006 would be one, which it replaces.
 
     Fix:
         Take the inertia from CAD, or compute it from the mesh at a uniform density.
