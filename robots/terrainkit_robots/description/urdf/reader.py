@@ -51,6 +51,7 @@ from terrainkit_robots.description.urdf.tags import (
     misspelled_names,
     repeated_children,
     unexpanded_xacro,
+    unread_elements,
 )
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
@@ -141,6 +142,8 @@ class _Reader:
             what = f"attribute {attribute} of <{element.tag}>" if attribute else f"<{element.tag}>"
             message = f"{what} is unknown and ignored; did you mean {known}?"
             self._report("XML007", element, message, attribute=attribute)
+        for element, message in unread_elements(root):
+            self._report("XML019", element, message)
         for element in repeated_children(root):
             parent = element.getparent()
             message = f"second <{element.tag}> in a <{parent.tag}>; expected one, and the first is "

@@ -48,6 +48,31 @@ _CHILDREN: Mapping[str, frozenset[str]] = {
 """Known children of elements; tools may add others."""
 
 
+_OTHER_FORMATS: Mapping[str, tuple[str, str]] = {
+    "pose": ("SDF", "<origin>"),
+    "model": ("SDF", "<link> and <joint>"),
+    **dict.fromkeys(("self_collide", "static", "kinematic"), ("SDF", "<gazebo>")),
+    **dict.fromkeys(("body", "worldbody"), ("MJCF", "<link> and <joint>")),
+    "geom": ("MJCF", "<visual> and <collision>"),
+    "freejoint": ("MJCF", '<joint type="floating">'),
+    **dict.fromkeys(
+        ("compiler", "option", "actuator", "equality", "tendon"), ("MJCF", "an MJCF file")
+    ),
+}
+"""Elements of other formats in the elements of `_CHILDREN`: the format, and where URDF has it."""
+
+_TOP_LEVEL = ("ros2_control", "transmission", "gazebo", "mujoco", "link", "joint")
+"""Elements that are read as children of <robot> only."""
+
+_FOREIGN_CONTENT = ("plugin", "sensor", "ros2_control", "mujoco", "transmission")
+"""Elements whose content is read by another tool."""
+
+_URDF_CONTENT = (
+    *("parent[@link]", "child[@link]", "inertial/mass[@value]"),
+    *(f"*/geometry/*[@{name}]" for name in ("size", "radius", "filename")),
+)
+"""What a link or joint of URDF has, but one of SDF has not, as paths."""
+
 _SINGLE_CHILDREN: Mapping[str, tuple[str, ...]] = {
     "link": ("inertial",),
     "inertial": ("origin", "mass", "inertia"),
@@ -89,6 +114,38 @@ def repeated_children(root: "etree._Element") -> Iterator["etree._Element"]:
                 if child.tag in seen:
                     yield child
                 seen.add(child.tag)
+
+
+def unread_elements(root: "etree._Element") -> Iterator[tuple["etree._Element", str]]:
+    """Yield elements that are not read where they are, and what to do."""
+    stack = [(root, True)]
+    while stack:
+        parent, is_urdf = stack.pop()  # a <gazebo> contains SDF
+        known = _CHILDREN.get(str(parent.tag), frozenset()) if is_urdf else frozenset()
+        for child in parent.iterchildren(etree.Element):
+            origin, use = _OTHER_FORMATS.get(child.tag, ("", ""))
+            if child.tag in _TOP_LEVEL and parent is not root and _is_urdf(child):
+                where = f"inside <{parent.tag}>; expected a child of <robot>"
+                yield child, f"<{child.tag}> is not read {where}"
+            elif origin and known and child.tag not in known and _has_effect(child):
+                lacks = "" if "origin" not in known or parent.find("origin") is not None else use
+                lacks = lacks and f", and the <{parent.tag}> has no {lacks}"
+                yield child, f"<{child.tag}> of {origin} is not read{lacks}; expected {use}"
+            elif child.tag not in _FOREIGN_CONTENT and ":" not in child.tag:
+                stack.append((child, is_urdf and child.tag != "gazebo"))
+
+
+def _is_urdf(element: "etree._Element") -> bool:
+    """Return whether an element is not a link or joint of SDF."""
+    is_part = element.tag in ("link", "joint")
+    return not is_part or any(element.find(path) is not None for path in _URDF_CONTENT)
+
+
+def _has_effect(element: "etree._Element") -> bool:
+    """Return whether an element is not a pose of zeros."""
+    texts = (element.text or "", *element.values())
+    numbers = [number for text in texts if (number := text.strip())]
+    return element.tag != "pose" or any(set(text) - set("0. -+") for text in numbers)
 
 
 def _is_described(element: "etree._Element") -> bool:

@@ -36,6 +36,24 @@ def unknown_tag(robot: Facts) -> None:
     """
 
 
+@rule("XML019", "unread-element", "warning")
+def unread_element(robot: Facts) -> None:
+    """An element is in a place where it is not read, or belongs to another format.
+
+    URDF readers silently skip a <ros2_control> or a <transmission> inside of <gazebo>, and a link
+    inside of another one. They skip <pose> of SDF as well, so that a joint without an <origin>
+    lies in the frame of its parent.
+
+    Fix:
+        Make the element a child of <robot>, or write what the message names.
+
+    Source:
+        Issue 1602 of ros2_control and issue 2 of botanbot_sim; wiki.ros.org/urdf/XML. The contents
+        of plugins, sensors and other extensions, and links and joints of SDF inside of <gazebo>,
+        are not checked.
+    """
+
+
 @rule("XML013", "missing-attribute", "error", fixes="safe")
 def missing_attribute(robot: Facts) -> None:
     """A required attribute or element is missing.
