@@ -66,12 +66,17 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
     known = {"link": links, "joint": joints, "link or joint": links | joints}
     found: dict[str, Problem] = {}
     assert doc.root is not None
-    for element, place, kind, name in _references(doc.root):
+    references = list(_references(doc.root))
+    used: dict[str, set[str]] = {place: set() for _, place, _, _ in references}
+    for _, place, _, name in references:
+        used[place].add(name)
+    for element, place, kind, name in references:
         if not name or name in known[kind] or name in found or has_variable(name):
             continue
         near = ""
         if len(found) < MAX_SUGGESTIONS and len(known[kind]) <= MAX_COMPARED:
-            near = closest(name, known[kind])
+            # A joint that another transmission drives is not the one that was meant.
+            near = closest(name, known[kind] - used[place])
             # Another number is another element, not a misspelling.
             near = "" if _NUMBERS.sub("", near) == _NUMBERS.sub("", name) else near
         suggestion = f" (did you mean {near}?)" if near else ""

@@ -58,14 +58,15 @@ def unknown_link(robot: Facts) -> Violations:
             element=uses[0][1],
             message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a "
             "link in the file",
-            hint=_suggestion(robot, name) if index < MAX_SUGGESTIONS else "",
+            hint=_suggestion(robot, name, uses[0][0]) if index < MAX_SUGGESTIONS else "",
         )
 
 
-def _suggestion(robot: Facts, name: str) -> str:
+def _suggestion(robot: Facts, name: str, role: str) -> str:
     """Return a hint with the link of the most similar name, if there is one."""
-    detached = _nearest(name, robot.tree.roots[1:])
-    nearest = detached or _nearest(name, list(robot.tree.links))
+    nearest = _nearest(name, robot.tree.roots[1:])
+    if not nearest and role == "parent":  # another joint holds the links that have a parent
+        nearest = _nearest(name, list(robot.tree.links))
     return f"Did you mean {nearest}? Names are case-sensitive." if nearest else ""
 
 
