@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit.errors import one_line
 from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape, physical_parent
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
@@ -93,6 +94,9 @@ class OverlapScene:
         Args:
             positions: Positions by joint [rad] or [m], each of shape (count,).
             count: Number of positions.
+
+        Raises:
+            CannotCheckError: if MuJoCo rejects a shape, such as a mesh without a volume.
         """
         if not len(self._pairs):
             yield from ([] for _ in range(count))
@@ -152,8 +156,9 @@ class OverlapScene:
             kind = shape.geometry.shape
             if kind == "mesh":
                 assert shape.geometry.mesh is not None
-                mesh = spec.add_mesh(name=f"mesh{index}")
-                hull = self._meshes.hull(shape.geometry.mesh.path)
+                path = shape.geometry.mesh.path
+                mesh = spec.add_mesh(name=f"{path.name} of link {shape.link}, shape {index}")
+                hull = self._meshes.hull(path)
                 mesh.uservert = (hull.points * shape.geometry.mesh.scale).ravel()
                 mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
                 geom_type = mujoco.mjtGeom.mjGEOM_MESH
@@ -163,8 +168,12 @@ class OverlapScene:
                 size = np.zeros(3)
                 size[: len(shape.geometry.size)] = shape.geometry.size
                 spec.worldbody.add_geom(type=geom_type, size=size, **pose)
-        with quiet_mujoco():
-            model = spec.compile()
+        try:
+            with quiet_mujoco():
+                model = spec.compile()
+        except (ValueError, mujoco.FatalError) as error:
+            reason = one_line(str(error).partition("\n")[0].removeprefix("Error: "))
+            raise CannotCheckError(f"MuJoCo rejects a collision shape: {reason}") from None
         return model, mujoco.MjData(model)
 
     @cached_property

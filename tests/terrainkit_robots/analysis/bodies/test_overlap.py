@@ -188,6 +188,15 @@ def test_scene_of_more_than_400_shapes_is_rejected(count):
         robot.overlap_scene.detect({})
 
 
+def test_mesh_without_a_volume_is_not_checked(tmp_path):
+    """1e-6 m: MuJoCo computes its hull, but rejects the mesh."""
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "plate.stl")
+    mesh = f'<mesh filename="{tmp_path}/plate.stl" scale="1e-5 1e-5 1e-5"/>'
+    scene = apart(ball(0.1), f"<collision><geometry>{mesh}</geometry></collision>", "0 0 0")
+    with pytest.raises(CannotCheckError, match="rejects a collision shape"):
+        scene.detect({})
+
+
 def test_bundled_quadruped_has_no_overlaps_when_it_stands(bundled):
     robot = bundled("quadruped.urdf")
     assert [o for o in robot.overlap_scene.detect(robot.default_pose) if o.depth > 0.001] == []
