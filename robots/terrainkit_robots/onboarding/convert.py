@@ -13,6 +13,7 @@ from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.keyframe import keyframe_defect
+from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
@@ -25,6 +26,7 @@ from terrainkit_robots.onboarding.repair import without_placeholder_efforts
 from terrainkit_robots.onboarding.source_model import with_compiled_gains
 from terrainkit_robots.spec.column import rounded_length
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
@@ -128,6 +130,7 @@ def convert(
             *exported.changes,
             *contact_changes,
             *imu_changes(facts),
+            *_held_joints(facts, spec),
             *(_keyframe_changes(facts) if user_spec is None else ()),
             *(effort_changes if user_spec is None else ()),
         ),
@@ -253,6 +256,20 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
     return (
         f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
         "a standing pose was solved instead",
+    )
+
+
+def _held_joints(facts: Facts, spec: "RobotSpec") -> tuple[str, ...]:
+    """Return one line if the last joints of legs turn without limits, but are held."""
+    stiffness = spec.per_joint("stiffness")
+    ends = [leg.joints[-1] for leg in facts.legs if not leg.limb.has_wheel]
+    held = [j.name for j in ends if turns_without_limits(j) and stiffness.get(j.name, 0.0) > 0]
+    if not held:
+        return ()
+    gains = names(f"{gain:g}" for gain in dict.fromkeys(stiffness[name] for name in held))
+    return (
+        f"{names(held, max_count=4)} turn without limits, but are held as ankles by a stiffness of "
+        f"{gains} N m/rad: their collision shapes are not round about their axes, as wheels are",
     )
 
 

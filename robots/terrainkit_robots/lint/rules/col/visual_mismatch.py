@@ -9,7 +9,8 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.model import Geometry
+from terrainkit_robots.analysis.legs.wheels import turns_without_limits
+from terrainkit_robots.description.model import Geometry, Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
@@ -28,6 +29,13 @@ _MIN_SHARE_INSIDE = 0.5
 """Share of a collision shape's bounding box that has to be inside of the visible robot around
 it."""
 
+_MAX_AXIS_ANGLE = math.radians(45)
+"""Allowed angle of a cylinder to the visible one, or of a wheel to the axis that it turns about
+[rad]."""
+
+_MAX_WHEEL_OFFSET = 0.1
+"""Allowed distance of the center of a wheel to its axis, over its radius."""
+
 _MAX_ELONGATION = 1.5
 """Ratio of the two longest sides of a shape that is between its joints however it is turned."""
 
@@ -42,13 +50,14 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
     The origin or the scale was changed in one of the two elements only. The robot collides where
     it cannot be seen, for example with its own thighs. A collision primitive that is larger than
     the visual primitive at the same place is reported as well, such as a sphere whose radius is
-    the diameter.
+    the diameter, and a cylinder that is turned against the visible one, or against the axis of the
+    wheel that it belongs to.
 
     Fix:
         Copy <origin> and scale from the correct element to the other one.
 
     Source:
-        Issue 184 of OrbbecSDK_ROS2 and issue 2969 of realsense-ros.
+        Issue 184 of OrbbecSDK_ROS2, issue 2969 of realsense-ros and issue 115 of unitree_ros.
     """
     for link in robot.links:
         for collision in link.collisions:
@@ -67,6 +76,65 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
                 "scale",
             )
     yield from _resized_primitives(robot)
+    yield from _turned_cylinders(robot)
+
+
+def _turned_cylinders(robot: Facts) -> Violations:
+    """Yield cylinders that lie across the visible ones, or across the axes of their wheels."""
+    parents = {body.parent for body in robot.bodies}
+    across: list[tuple[BodyShape, str, float]] = []
+    for body in robot.bodies:
+        joint, shapes = body.joint, body.collisions
+        is_end = joint is not None and turns_without_limits(joint) and body.index not in parents
+        for shape in shapes:
+            for visual in body.visuals:
+                angle = _axis_angle(shape.pose, visual.pose[:3, 2])
+                if _is_same_cylinder(shape, visual) and angle > _MAX_AXIS_ANGLE:
+                    across.append((shape, "the visible cylinder", angle))
+                    break
+            else:
+                if joint is not None and is_end and len(shapes) == 1 and _is_wheel(shape, joint):
+                    angle = _axis_angle(shape.pose, joint.direction)
+                    if angle > _MAX_AXIS_ANGLE:
+                        across.append((shape, f"the axis of joint {joint.name}", angle))
+    for shape, reference, angle in across:
+        # One disk across its axis may be a lens that turns; wheels come in pairs.
+        if reference.startswith("the visible") or len(across) > 1:
+            yield Violation(
+                subject=shape.link,
+                source=shape.geometry.source,
+                certainty="likely",
+                message=f"axis of the collision cylinder of link {shape.link}: got "
+                f"{math.degrees(angle):.3g} deg to {reference}; expected 0 deg",
+                measured={"angle": math.degrees(angle)},
+            )
+
+
+def _axis_angle(pose: Matrix, axis: Matrix) -> float:
+    """Return the angle between the z axis of a pose and an axis, which has no direction [rad]."""
+    return math.acos(min(abs(float(pose[:3, 2] @ axis)), 1.0))
+
+
+def _is_same_cylinder(a: BodyShape, b: BodyShape) -> bool:
+    """Return whether two cylinders have the same size and center."""
+    sizes = a.geometry.size, b.geometry.size
+    is_cylinder = a.geometry.shape == b.geometry.shape == "cylinder" and a.link == b.link
+    return (
+        is_cylinder
+        and len(sizes[0]) == len(sizes[1]) == 2
+        and np.allclose(*sizes, rtol=_MAX_SIZE_RATIO - 1, atol=0)
+        and float(np.linalg.norm(a.pose[:3, 3] - b.pose[:3, 3])) < _MAX_OFFSET
+    )
+
+
+def _is_wheel(shape: BodyShape, joint: Joint) -> bool:
+    """Return whether a shape is a disk in the middle of the axis of a joint."""
+    if shape.geometry.shape != "cylinder" or len(shape.geometry.size) != 2:
+        return False
+    radius, half_length = shape.geometry.size
+    arm = np.cross(shape.pose[:3, 3] - joint.anchor, joint.direction)
+    is_centered = float(np.linalg.norm(arm)) <= _MAX_WHEEL_OFFSET * radius
+    return is_centered and radius > half_length > 0
 
 
 def _resized_primitives(robot: Facts) -> Violations:
