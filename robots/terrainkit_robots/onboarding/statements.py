@@ -142,11 +142,12 @@ def _fixes(result: "OnboardResult") -> Iterator[Statement]:
     codes = dict.fromkeys(finding.code for finding in result.fixed)
     text = f"{count(len(result.fixed), 'finding')}: {names(codes)}"
     yield Statement("changes", _fixed(result.fixed), "fixed", text)
-    for noun, family in (("inertia", "INR"), ("path", "MSH")):
-        subjects = _repairable(result.fixed, family)
-        if subjects:
-            nouns = f"{noun}s" if len(subjects) > 1 else noun
-            text = f"the {nouns} of {names(subjects, max_count=3)}; see report.md"
+    for family in ("INR", "MSH"):
+        fixes = [f.fix for f in result.fixed if f.family == family and f.fix is not None]
+        texts = [fix.description.rstrip(".") for fix in fixes]
+        if texts:
+            more = f"; {len(texts) - 3} more" if texts[3:] else ""
+            text = f"{'; '.join(texts[:3])}{more}; see report.md"
             yield Statement("changes", (), "repaired", text)
 
 

@@ -10,8 +10,9 @@ from terrainkit_robots.onboarding.verify import Verification
 
 
 def finding(code, subject, onboarding="repairs"):
+    fix = SimpleNamespace(description=f"Replace {subject}.")
     return SimpleNamespace(
-        code=code, family=code[:3], subject=subject, onboarding=onboarding, fix=None, message=""
+        code=code, family=code[:3], subject=subject, onboarding=onboarding, fix=fix, message=""
     )
 
 
@@ -63,12 +64,10 @@ def test_summary_without_files_ends_after_the_fixes(lines):
     assert lines(robot=None, fixed=fixed) == {
         "checked": "2 findings",
         "fixed": "4 findings: INR003",
-        "repaired": "the inertias of a, b, c, ...; see report.md",
+        "repaired": "Replace a; Replace b; Replace c; 1 more; see report.md",
     }
-    assert (
-        lines(robot=None, fixed=[finding("MSH001", "a.stl")])["repaired"]
-        == "the path of a.stl; see report.md"
-    )
+    found = lines(robot=None, fixed=[finding("MSH004", "a.stl", "converts")])
+    assert found["repaired"] == "Replace a.stl; see report.md"
 
 
 def test_summary_lists_what_else_happened(lines):

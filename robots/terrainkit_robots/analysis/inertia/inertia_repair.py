@@ -24,8 +24,12 @@ from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
-_MAX_MASS_DIFFERENCE = 0.02
-"""Relative difference of masses up to which a link takes the inertia of its mirror image."""
+_MAX_MASS_DIFFERENCE = 0.2
+"""Relative difference of masses up to which a link takes the inertia of its mirror image, which is
+scaled by the ratio of the masses."""
+
+_MAX_SAME_MASS = 0.02
+"""The same difference up to which it is not scaled."""
 
 _ATTRIBUTES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
@@ -82,8 +86,9 @@ class InertiaRepair:
         """Return a physical inertia in the inertial frame of a link, and what it is."""
         # The mirror image is the same part with valid numbers. The nearest inertia keeps the axes
         # and most of what is declared. The box knows no more than the size and the mass.
+        mirrored, image = self._mirror_inertia(link)
         candidates = (
-            (self._mirror_inertia(link), "the inertia of its mirror image"),
+            (mirrored, f"the inertia of its mirror image {image}"),
             (self._nearest(link, declared), "the nearest physical inertia"),
             (self._solid_box(link, inertial), "the inertia of a solid box around the body"),
         )
@@ -98,27 +103,33 @@ class InertiaRepair:
             for index, link in enumerate(body.links)
         }
 
-    def _mirror_inertia(self, link: Link) -> Matrix | None:
-        """Return the mirrored inertia in the inertial frame of a link, if it is physical."""
+    def _mirror_inertia(self, link: Link) -> tuple[Matrix | None, str]:
+        """Return the mirrored inertia in the inertial frame of a link, and of which link it is.
+
+        None if it is not physical, or the masses differ.
+        """
         if link.name not in self._location:
-            return None
+            return None, ""
         body, index = self._location[link.name]
         other_index = self.mirror.image_index.get(body.index)
         # Links have no mirror images of their own: they correspond by their place in the body.
         if other_index is None or len(self.bodies[other_index].links) != len(body.links):
-            return None
+            return None, ""
         other = self.bodies[other_index].links[index]
         mass, other_mass = _mass(link), _mass(other)
         if other.inertial is None or other.inertial.inertia is None or not other_mass > 0:
-            return None
+            return None, ""
         inertia, moments = other.inertial.inertia, principal_moments(other.inertial.inertia)
         if moments[0] <= 0 or triangle_ratio(moments) < 1:
-            return None
+            return None, ""
         if abs(mass - other_mass) > _MAX_MASS_DIFFERENCE * other_mass:
-            return None
+            return None, ""
         # From the other inertial frame to the trunk, mirrored, and to the own inertial frame.
         transform = self._axes(link).T @ self.mirror.reflection @ self._axes(other)
-        return np.asarray(transform @ inertia @ transform.T)
+        difference = abs(mass - other_mass) / other_mass
+        scale = mass / other_mass if difference > _MAX_SAME_MASS else 1.0
+        image = other.name if scale == 1.0 else f"{other.name}, times {scale:.3g} as its mass is"
+        return np.asarray(scale * (transform @ inertia @ transform.T)), image
 
     def _axes(self, link: Link) -> Matrix:
         """Return the axes of a link's inertial frame in the frame of the trunk, shape (3, 3)."""

@@ -119,15 +119,16 @@ MIRRORED = dict(zip(NAMES, (0.00584, 0.0058, 0.00103, 8.72e-05, -0.000289, 0.000
 BOX = dict(zip(NAMES, (0.00441305, 0.00446640, 0.00016860, 0.0, 0.0, 0.0), strict=True))
 
 
-@pytest.mark.parametrize("mass", [1.152, 1.13])
-def test_urdf_fix_mirrors_the_signs_of_products(mass):
+@pytest.mark.parametrize(("mass", "scale"), [(1.152, 1), (1.13, 1), (1.28, 0.9)])
+def test_urdf_fix_mirrors_the_signs_of_products(mass, scale):
     taken, values = urdf_fix({"iyy": -0.0058}, {"value": mass})
-    assert taken == "the inertia of its mirror image."
-    assert values == pytest.approx(MIRRORED)
+    more = "" if scale == 1 else f", times {scale} as its mass is"
+    assert taken == f"the inertia of its mirror image FR_thigh{more}."
+    assert values == pytest.approx({name: scale * value for name, value in MIRRORED.items()})
 
 
-# Of which the first violates the triangle inequality, and the third is 2 % lighter.
-@pytest.mark.parametrize("right", [{"izz": 0.5}, {"izz": -0.001}, {"value": 1.129}, {"value": 0}])
+# Of which the first violates the triangle inequality, and the third is 21 % lighter.
+@pytest.mark.parametrize("right", [{"izz": 0.5}, {"izz": -0.001}, {"value": 0.95}, {"value": 0}])
 def test_urdf_fix_takes_no_invalid_mirror_image(right):
     taken, values = urdf_fix({"ixx": 0.0075}, right)
     assert taken == "the nearest physical inertia."

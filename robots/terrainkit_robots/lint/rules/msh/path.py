@@ -214,7 +214,7 @@ def filename_case(robot: Facts) -> Violations:
             element=used,
             message=f"path of the {used.role}: got {used.name}; expected {expected}",
             severity=not_loaded(used),
-            fix=make_fix("safe", f"Change the path to {expected}.", edits),
+            fix=make_fix("safe", f"Change the path {used.name} to the file {expected}.", edits),
         )
 
 
