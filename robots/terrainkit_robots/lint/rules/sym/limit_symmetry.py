@@ -13,6 +13,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rules.sym.mimic import same_way_follower
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules
 from terrainkit_robots.text import contrast, numbers
 from terrainkit_robots.transforms import Matrix
@@ -42,7 +43,7 @@ def limit_asymmetry(robot: Facts) -> Violations:
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
-        if other_rules.report(pair):
+        if other_rules.report(pair) or same_way_follower(robot, pair) is not None:
             continue
         if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis

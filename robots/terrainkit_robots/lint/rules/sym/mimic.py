@@ -1,11 +1,20 @@
 """Rule on the symmetry of mimic joints."""
 
 import math
+import re
+
+import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import side_words
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+
+_FINGER_NAME = re.compile(r"finger|grip|jaw|claw|knuckle|thumb")
+
+_MIN_SHARE_ACROSS = 0.7
+"""Share of the motion of a finger that closes the gripper, at least."""
 
 
 @rule("SYM012", "mimic-asymmetry", "warning")
@@ -13,15 +22,18 @@ def mimic_asymmetry(robot: Facts) -> Violations:
     """A joint and its mirror image do not follow mirrored joints in the same way.
 
     Only one of them is coupled, or it follows a joint of the other side or of another leg, or its
-    multiplier has a wrong sign: names and signs were not changed after copying one side.
+    multiplier has a wrong sign: names and signs were not changed after copying one side. Two
+    fingers of which one follows the other have to move in opposite directions.
 
     Fix:
         Give both joints a <mimic> of their own side. The multipliers are equal, or opposite if the
-        axis of exactly one of the two joints is mirrored.
+        axis of exactly one of the two joints is mirrored. Negate the axis or the multiplier of a
+        finger.
 
     Source:
         http://wiki.ros.org/urdf/XML/joint: mimic.
     """
+    yield from _same_way(robot)
     images: dict[str, str] = {}
     signs: dict[str, int] = {}
     for pair in robot.mirror_pairs:
@@ -63,6 +75,42 @@ def mimic_asymmetry(robot: Facts) -> Violations:
                 source=mimic.source,
                 message=f"mimic of joint {odd.name}: {problem}",
             )
+
+
+def _same_way(robot: Facts) -> Violations:
+    """Yield fingers that follow another one in the same direction."""
+    for pair in robot.mirror_pairs:
+        follower = same_way_follower(robot, pair)
+        if follower is not None and (mimic := follower.mimic) is not None:
+            links = f"{pair.left.body.top.name} and {pair.right.body.top.name}"
+            yield Violation(
+                subject=follower.name,
+                source=mimic.source,
+                certainty="likely",
+                message=f"mimic of joint {follower.name}: got the multiplier {mimic.multiplier:g}, "
+                f"which moves {links} the same way; expected opposite ways: the axis or the "
+                "multiplier has the wrong sign",
+            )
+
+
+def same_way_follower(robot: Facts, pair: MirrorPair) -> Joint | None:
+    """Return the joint of two mirrored fingers that follows the other one the same way.
+
+    Fingers slide along the line between them, or are named so: the wheels of an axle turn the same
+    way, as eyes do.
+    """
+    for side, other in ((pair.left, pair.right), (pair.right, pair.left)):
+        joint, bodies = side.joint, (side.body, other.body)
+        mimic = joint.mimic
+        if mimic is None or mimic.joint != other.joint.name or mimic.multiplier * pair.sign >= 0:
+            continue
+        if joint.kind != "prismatic":
+            names = (joint.name, *(body.top.name for body in bodies))
+            return joint if any(_FINGER_NAME.search(name.lower()) for name in names) else None
+        normal = np.abs(robot.mirror.reflection.diagonal() - 1) / 2
+        way = side.body.zero_pose[:3, :3] @ joint.direction
+        return joint if float(np.abs(way) @ normal) > _MIN_SHARE_ACROSS else None
+    return None
 
 
 def _crosses(robot: Facts, joint: Joint) -> bool:
