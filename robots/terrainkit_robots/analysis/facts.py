@@ -23,6 +23,7 @@ from terrainkit_robots.analysis.legs.joint_roles import leg_joints, robot_joints
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
 from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
+from terrainkit_robots.analysis.legs.passive_joints import passive_joints
 from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
 from terrainkit_robots.analysis.legs.wheels import is_balanced
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, meshes_by_file, meshes_by_name
@@ -141,9 +142,20 @@ class Facts:
     def actuated(self) -> tuple[Joint, ...]:
         """The actuated joints.
 
-        In URDF these are the joints that mimic no other. In MJCF these are the joints with an
+        In URDF these are the joints that are not passive. In MJCF these are the joints with an
         actuator, or all joints if the file has no actuators.
         """
+        passive = self.passive_joints if self.model.kind != "mjcf" else {}
+        return tuple(joint for joint in self._maybe_actuated if joint.name not in passive)
+
+    @cached_property
+    def passive_joints(self) -> Mapping[str, str]:
+        """Why a joint has no motor, for the joints that are passive by design, by name."""
+        return passive_joints(self.model, self.bodies, self.leg_bodies)
+
+    @cached_property
+    def _maybe_actuated(self) -> tuple[Joint, ...]:
+        """The joints that may be actuated, from which the legs follow."""
         joints = tuple(joint for joint in self.joints if joint.mimic is None)
         names = {actuator.joint for actuator in self.model.actuators} - {""}
         return tuple(joint for joint in joints if joint.name in names) if names else joints
@@ -228,7 +240,7 @@ class Facts:
     def limbs(self) -> tuple[Limb, ...]:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
-        actuated = self.joints if has_tendons else self.actuated
+        actuated = self.joints if has_tendons else self._maybe_actuated
         loops = [loop.bodies for loop in self.loops]
         return detect_limbs(self.tree, self.bodies, actuated, self.meshes, loops)
 

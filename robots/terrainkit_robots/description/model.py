@@ -471,6 +471,10 @@ class Actuator:
     """Range of the commanded force of a motor; None if it is unlimited or commands something
     else."""
 
+    targets: tuple[float, float] | None = None
+    """Range of the target position of the joint [rad] or [m]; None if it is unlimited or not a
+    position actuator."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PhysicsOptions:
@@ -514,6 +518,9 @@ class RobotModel:
 
     actuators: tuple[Actuator, ...] = ()
     """Actuators in document order; MJCF only."""
+
+    driven: frozenset[str] = frozenset()
+    """Names of joints with a transmission or a command interface of ros2_control; URDF only."""
 
     options: PhysicsOptions | None = None
     """Settings of the simulation; None for URDF."""

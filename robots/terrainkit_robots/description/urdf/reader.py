@@ -106,6 +106,7 @@ class _Reader:
             source=source,
             links=links,
             joints=joints,
+            driven=frozenset(_driven_joints(root)),
             keeps_fixed_links=compiler is not None and compiler.get("fusestatic") == "false",
             problems=tuple(self._problems),
             sources=(self._doc.file,),
@@ -452,6 +453,12 @@ def _owner(element: "etree._Element") -> str:
     """Return the name of the link or joint that contains an element."""
     owners = (owner for owner in (element, *element.iterancestors()) if owner.tag in _NAMED_TAGS)
     return next((str(owner.get("name")) for owner in owners if owner.get("name")), "")
+
+
+def _driven_joints(root: "etree._Element") -> Iterator[str]:
+    """Yield the names of joints with a transmission or a command interface."""
+    for path in ("transmission/joint", "ros2_control/joint[command_interface]"):
+        yield from (joint.get("name", "") for joint in root.iterfind(path))
 
 
 def _same_content(first: "etree._Element", second: "etree._Element") -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.passive_joints import OPEN_LINKAGE
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Actuator, Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
@@ -41,6 +42,8 @@ def missing_effort(robot: Facts) -> Violations:
     Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF. With an effort of 0 the
     joint stays limp, whereas MuJoCo treats 0 as no limit. If the number is missing, simulators
     apply no limit or a default, and the policy learns with torques that the motor does not have.
+    Joints that are passive by design have no motor: they follow others, or have no transmission. A
+    rod that hangs on a leg is a warning, since its loop is open.
 
     Fix:
         Give the peak torque of the motor after the gear [N m], or the force [N].
@@ -50,6 +53,20 @@ def missing_effort(robot: Facts) -> Violations:
     """
     for joint, effort in _missing_limits(robot, "effort"):
         unit = joint.effort_unit
+        reason = robot.passive_joints.get(joint.name)
+        if reason == OPEN_LINKAGE:
+            yield Violation(
+                subject=joint.name,
+                source=(joint.limit or joint).source,
+                severity="warning",
+                certainty="likely",
+                message=f"joint {joint.name}: got {OPEN_LINKAGE}, without a motor; expected a "
+                "closed loop, or a fixed joint",
+                hint="Close the loop in MJCF or in the simulator, or remove the part: it hangs "
+                "loose. It needs no effort, and no action.",
+            )
+        if reason:
+            continue
         yield Violation(
             subject=joint.name,
             source=(joint.limit or joint).source,
@@ -103,12 +120,14 @@ def missing_velocity(robot: Facts) -> Violations:
     """
     for joint, velocity in _missing_limits(robot, "velocity"):
         unit = joint.speed_unit
+        is_passive = joint.name in robot.passive_joints
+        speed = "largest speed of the part" if is_passive else "no-load speed of the motor"
         yield Violation(
             subject=joint.name,
             source=(joint.limit or joint).source,
             message=f"velocity limit of joint {joint.name}: got "
             f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
-            f"no-load speed of the motor [{unit}]",
+            f"{speed} [{unit}]",
         )
 
 
