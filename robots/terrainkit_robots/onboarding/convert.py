@@ -131,6 +131,7 @@ def convert(
             *contact_changes,
             *imu_changes(facts),
             *_held_joints(facts, spec),
+            *_replaced_ranges(source.model),
             *(_keyframe_changes(facts) if user_spec is None else ()),
             *(effort_changes if user_spec is None else ()),
         ),
@@ -257,6 +258,20 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
         f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
         "a standing pose was solved instead",
     )
+
+
+def _replaced_ranges(model: "RobotModel") -> tuple[str, ...]:
+    """Return one line if targets of the source differ from the limits of their joints."""
+    limits = {joint.name: joint.range for joint in model.joints}
+    found = [
+        f"{motor.joint} ({motor.targets[0]:.4g} to {motor.targets[1]:.4g})"
+        for motor in model.actuators
+        if motor.targets and (own := limits.get(motor.joint))
+        if not np.allclose(motor.targets, own, atol=1e-3)
+    ]
+    if not found:
+        return ()
+    return (f"the limits of the joints replace the ctrlrange of {names(found, max_count=4)}",)
 
 
 def _held_joints(facts: Facts, spec: "RobotSpec") -> tuple[str, ...]:

@@ -42,6 +42,10 @@ class ActuatorData:
     commands: tuple[float, float] | None
     """Range of the commanded force; None if it is unlimited or commands something else."""
 
+    targets: tuple[float, float] | None
+    """Range of the target position of the joint [rad] or [m]; None if it is unlimited or commands
+    something else."""
+
     def to_actuator(self, factor: float, max_effort: float | None) -> Actuator:
         """Return the actuator of the model.
 
@@ -60,6 +64,7 @@ class ActuatorData:
             gear=self.gear,
             stiffness=None if self.stiffness is None else self.stiffness * factor,
             commands=self.commands,
+            targets=self.targets,
         )
 
 
@@ -77,6 +82,11 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
             actuator.forcelimited, actuator.forcerange, actuator.compiler.autolimits
         )
         force = min((f for f in (commanded, limit) if f is not None), default=None)
+        stiffness, control = _stiffness(actuator, gear), actuator.ctrlrange
+        is_limited = (
+            _max_magnitude(actuator.ctrllimited, control, actuator.compiler.autolimits) is not None
+        )
+        low, high = sorted(float(end) / (gear or 1.0) for end in control)
         yield ActuatorData(
             name=actuator.name or (f"{joint}_actuator" if joint else node.tag),
             source=node.source,
@@ -84,12 +94,11 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
             effort=None if force is None else force * abs(gear),
             armature=float(getattr(actuator, "armature", 0.0)) * gear**2,
             gear=gear,
-            stiffness=_stiffness(actuator, gear),
+            stiffness=stiffness,
             # A positive value is a damping ratio.
             damping=-float(actuator.biasprm[2]) * gear**2 if actuator.biasprm[2] < 0 else None,
-            commands=None
-            if commanded is None
-            else (float(actuator.ctrlrange[0]), float(actuator.ctrlrange[1])),
+            commands=None if commanded is None else (float(control[0]), float(control[1])),
+            targets=(low, high) if stiffness and is_limited and gear else None,
         )
 
 

@@ -1,11 +1,15 @@
 """Rules on actuators and safety controllers."""
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.passive_joints import OPEN_LINKAGE
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import count, names
 
 _MAX_COMMAND_RATIO = 4.0
 """Allowed ratio of the two ends of the control range of a motor."""
+
+_MIN_REACHED = 0.05
+"""Share of the range of a joint that the targets of its actuator reach, at least."""
 
 
 @rule("JNT016", "missing-actuator", "warning")
@@ -40,10 +44,16 @@ def missing_actuator(robot: Facts) -> Violations:
         return
     for joint in robot.robot_joints:
         if joint.name not in actuated and joint.mimic is None and not joint.coupled:
+            reason = robot.passive_joints.get(joint.name)
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",
-                message=f"actuators of joint {joint.name}: got 0; expected 1",
+                message=f"actuators of joint {joint.name}: got 0"
+                + (
+                    f"; it is probably {reason}; expected an <equality> that closes the loop"
+                    if reason == OPEN_LINKAGE
+                    else "; expected 1"
+                ),
             )
 
 
@@ -106,6 +116,38 @@ def one_sided_motor(robot: Facts) -> Violations:
                 message=f"control range of the motor of joint {actuator.joint}: got {lower:g} to "
                 f"{upper:g}; expected both signs with similar values",
                 measured={"lower": lower, "upper": upper},
+            )
+
+
+@rule("JNT029", "unreachable-range", "warning")
+def unreachable_range(robot: Facts) -> Violations:
+    """The targets of a position actuator reach almost nothing of the range of its joint.
+
+    The joint is pressed against its limit at every command. Usually a sign was not mirrored, or the
+    range is in degrees. OPT011 reports targets far beyond the limits.
+
+    Fix:
+        Replace ctrlrange by inheritrange="1", or give the limits of the joint in radians.
+
+    Source:
+        Pull request 4 of robotis_mujoco_menagerie; MuJoCo's XML reference, position: inheritrange.
+    """
+    joints = {joint.name: joint for joint in robot.joints}
+    for actuator in robot.model.actuators:
+        joint = joints.get(actuator.joint)
+        if actuator.targets is None or joint is None or joint.range is None:
+            continue
+        lower, upper = joint.range
+        low, high = actuator.targets
+        reached = max(min(high, upper) - max(low, lower), 0.0) / (upper - lower)
+        if reached < _MIN_REACHED:
+            yield Violation(
+                subject=joint.name,
+                source=actuator.source,
+                message=f"targets of the actuator of joint {joint.name}: got {low:.4g} to "
+                f"{high:.4g} {joint.unit}, {reached:.0%} of the range of {lower:.4g} to "
+                f"{upper:.4g} {joint.unit}; expected at least {_MIN_REACHED:.0%}",
+                measured={"reached": reached},
             )
 
 

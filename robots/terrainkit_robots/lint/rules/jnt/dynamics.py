@@ -142,7 +142,7 @@ def excessive_armature(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT029", "sprung-base", "warning")
+@rule("JNT030", "sprung-base", "warning")
 def sprung_base(robot: Facts) -> Violations:
     """Springs or dampers act on the joints of a floating base.
 
