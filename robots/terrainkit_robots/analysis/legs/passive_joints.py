@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.description.model import Joint, RobotModel
 
-OPEN_LINKAGE = "a passive part of an open linkage"
+OPEN_LINKAGE = "it is a passive part of an open linkage"
 """Reason for a rod that hangs on a leg: its other end is free, since a URDF is a tree."""
 
 _PASSIVE_NAME = re.compile(r"passive|caster|castor|spring|(?<![a-z])(push_?)?rods?(?![a-z])")

@@ -50,7 +50,7 @@ def missing_actuator(robot: Facts) -> Violations:
                 severity="warning" if robot.legs else "note",
                 message=f"actuators of joint {joint.name}: got 0"
                 + (
-                    f"; it is probably {reason}; expected an <equality> that closes the loop"
+                    f"; {reason}; expected an <equality> that closes the loop"
                     if reason == OPEN_LINKAGE
                     else "; expected 1"
                 ),

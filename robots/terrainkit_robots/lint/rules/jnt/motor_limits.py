@@ -35,6 +35,12 @@ _MIN_LEG_VELOCITY = 0.2
 """Smallest plausible velocity limit of a leg joint [rad/s]. A yaw joint of Romeo has 0.32."""
 
 
+_HOW_TO_CLOSE = (
+    "Close the loop in MJCF or in the simulator, or remove the part, which hangs loose. It needs "
+    "no effort, and no action."
+)
+
+
 @rule("JNT009", "missing-effort", "error")
 def missing_effort(robot: Facts) -> Violations:
     """The effort limit of a joint is zero or missing.
@@ -42,8 +48,9 @@ def missing_effort(robot: Facts) -> Violations:
     Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF. With an effort of 0 the
     joint stays limp, whereas MuJoCo treats 0 as no limit. If the number is missing, simulators
     apply no limit or a default, and the policy learns with torques that the motor does not have.
-    Joints that are passive by design have no motor: they follow others, or have no transmission. A
-    rod that hangs on a leg is a warning, since its loop is open.
+    Joints that are passive by design have no motor: a joint that follows another one is not
+    reported, one without a transmission is a note, and a rod that hangs on a leg is a warning,
+    since its loop is open.
 
     Fix:
         Give the peak torque of the motor after the gear [N m], or the force [N].
@@ -54,18 +61,19 @@ def missing_effort(robot: Facts) -> Violations:
     for joint, effort in _missing_limits(robot, "effort"):
         unit = joint.effort_unit
         reason = robot.passive_joints.get(joint.name)
-        if reason == OPEN_LINKAGE:
-            yield Violation(
-                subject=joint.name,
-                source=(joint.limit or joint).source,
-                severity="warning",
-                certainty="likely",
-                message=f"joint {joint.name}: got {OPEN_LINKAGE}, without a motor; expected a "
-                "closed loop, or a fixed joint",
-                hint="Close the loop in MJCF or in the simulator, or remove the part: it hangs "
-                "loose. It needs no effort, and no action.",
-            )
         if reason:
+            is_open = reason == OPEN_LINKAGE
+            expected = "a closed loop, or a fixed joint" if is_open else "a motor, unless by design"
+            if joint.mimic is None:
+                yield Violation(
+                    subject=joint.name,
+                    source=(joint.limit or joint).source,
+                    severity="warning" if is_open else "note",
+                    certainty="likely",
+                    message=f"effort limit of joint {joint.name}: got {effort or 0:g} {unit}, as "
+                    f"of a joint without a motor: {reason}; expected {expected}",
+                    hint=_HOW_TO_CLOSE if is_open else "",
+                )
             continue
         yield Violation(
             subject=joint.name,
