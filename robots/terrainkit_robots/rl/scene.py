@@ -55,7 +55,7 @@ class Scene:
             ConfigError: If MuJoCo rejects the robot, or its spec differs from its model.
         """
         with quiet_mujoco():
-            mjspec = _attach(robot, terrain, task)
+            mjspec, home = _attach(robot, terrain, task)
             _set_joints_and_collisions(robot, _checked_base(robot, mjspec), task)
             _add_actuators(robot, mjspec, task)
             self.sensors = _add_sensors(robot, mjspec)  # range of each kind in sensordata
@@ -77,6 +77,8 @@ class Scene:
         slide = mujoco.mjtJoint.mjJNT_SLIDE
         self.joint_units = tuple("m" if model.jnt_type[k] == slide else "rad" for k in joints)
         self.default_qpos = model.qpos0.copy()  # the default pose with the base at height 0
+        if len(home) == model.nq:  # passive joints, at which closed loops are closed
+            self.default_qpos[:] = home
         self.default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
         self.default_qpos[self.joint_qpos] = robot.default_pose
         self.base: int = model.body(robot.spec.base).id
@@ -87,14 +89,15 @@ class Scene:
         self.foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
 
 
-def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
-    """Return the MjSpec of robot and terrain."""
+def _attach(robot: Robot, terrain: Ground, task: Task) -> tuple[Any, Any]:
+    """Return the MjSpec of robot and terrain, and the positions of the first keyframe, if any."""
     try:
         mjspec = mujoco.MjSpec.from_file(str(robot.mjcf))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {reason}") from None
     ground_mjspec = terrain.spec()
+    home = np.array(mjspec.keys[0].qpos if mjspec.keys else [])
     for element in (*mjspec.actuators, *mjspec.sensors, *mjspec.keys, *mjspec.cameras):
         mjspec.delete(element)
     for model_spec in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
@@ -108,7 +111,7 @@ def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
         model_spec.option.ls_iterations = task.sim.ls_iterations
     # The terrain is attached to the robot, so the robot's names keep their form.
     mjspec.attach(ground_mjspec, frame=mjspec.worldbody.add_frame(), prefix="ground/")
-    return mjspec
+    return mjspec, home
 
 
 def _checked_base(robot: Robot, mjspec: Any) -> Any:

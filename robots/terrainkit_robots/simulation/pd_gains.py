@@ -197,7 +197,7 @@ def _merge(targets: Iterable[GainTarget]) -> list[GainTarget]:
 
 def _wheels(facts: Facts, sim: SimModel) -> frozenset[str]:
     """Return the actuated joints that turn a wheel at the end of a leg, or elsewhere."""
-    legs = {joint.name for leg in facts.legs for joint in leg.joints}
+    legs = {joint.name for leg in facts.legs for joint in (*leg.joints, *leg.branches)}
     wheels = {facts.bodies[index].joint for index in facts.wheels}
     return frozenset(
         name

@@ -131,7 +131,7 @@ def action_scale_column(
         velocity: Velocity limits.
     """
     column: Column = {}
-    in_legs = {joint.name for leg in facts.legs for joint in leg.joints}
+    in_legs = {joint.name for leg in facts.legs for joint in (*leg.joints, *leg.branches)}
     for joint in facts.actuated:
         stiffness = gains[joint.name].stiffness
         if stiffness > 0 and in_legs and joint.name not in in_legs:

@@ -50,7 +50,7 @@ def low_joint_inertia(robot: Facts) -> Violations:
     inertia = inertias[lightest].free
     without = {name: replace(gain, armature=declared[name]) for name, gain in gains.items()}
     step = max_stable_time_step(model, without).seconds
-    legged = {joint.name for leg in robot.legs for joint in leg.joints}
+    legged = {joint.name for leg in robot.legs for joint in (*leg.joints, *leg.branches)}
     is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE
     others = count(len(shares) - 1, "other joint")
     yield Violation(
