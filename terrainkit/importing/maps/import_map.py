@@ -42,6 +42,10 @@ DEFAULT_CELL = 0.1
 """Distance between two samples of a map that is made from a mesh [m]."""
 
 
+_ROUNDING = 1e-4
+"""Share of a cell that rounding of the extent of a file may take."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ImportedMap:
     """A map and the differences from its file."""
@@ -198,10 +202,10 @@ def make_config(
             )
         if options.patch_size:
             size = options.patch_size[k]
-            count = count or math.floor(extent / size + 1e-6)
+            count = count or math.floor(extent / size + _ROUNDING)
         else:
             count = count or 1
-            size = round(math.floor(extent / cell / count + 1e-6) * cell, 9)
+            size = round(math.floor(extent / cell / count + _ROUNDING) * cell, 9)
         if count < 1 or size < cell or count * size > extent + cell / 2:
             raise ConfigError(
                 f"patches along {axis}: got {max(count, 1)} of {size or cell:g} m; {path} has "

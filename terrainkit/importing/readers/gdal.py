@@ -12,6 +12,7 @@ from terrainkit.importing.readers.georeference import Georeference
 from terrainkit.importing.readers.height_source import Source, decode, require
 from terrainkit.importing.readers.import_options import ReadOptions
 from terrainkit.importing.readers.pixels import MAX_PIXELS, pixels_raster
+from terrainkit.settings.toml_text import read_text
 
 _DRIVERS = {".hgt": "SRTMHGT", ".dem": "USGSDEM", ".bil": "EHdr", ".img": "HFA"}
 _DRIVERS |= dict.fromkeys((".dt0", ".dt1", ".dt2"), "DTED")
@@ -54,6 +55,9 @@ def read_gdal(path: Path) -> tuple[NDArray[np.generic], Georeference]:
         is_tiff = file.read(2) in (b"II", b"MM")
     # One driver only: others, such as VRT, may name further files.
     driver = "GTiff" if is_tiff else _DRIVERS.get(path.suffix.lower(), "GTiff")
+    header = path.with_suffix(".hdr")
+    if driver == "EHdr" and header.is_file() and read_text(header).startswith("ENVI"):
+        driver = "ENVI"
     found = decode(_read_gdal, path, driver)
     unit, height_unit, is_web_mercator = found["units"].tolist()
     return np.ma.masked_array(found["pixels"], found["mask"]), Georeference(

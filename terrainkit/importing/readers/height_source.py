@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 MAX_FILE_BYTES = 1 << 30
 """Largest file that is read [bytes]."""
 
+_MAX_MISSING = 0.9
+"""Largest share of heights that become the nearest ones; of more, little is ground of the file."""
+
 _CONVERTERS = Path(__file__).with_name("converters.toml")
 """The suffixes that programs convert, by the name of the program."""
 
@@ -231,6 +234,11 @@ def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Arra
     if missing == "reject" or count == heights.size:
         hint = "" if count == heights.size else "; --missing nearest or lowest fills them"
         raise HeightFileError(found + hint)
+    if count > _MAX_MISSING * heights.size and missing == "nearest":
+        raise HeightFileError(
+            f"{found}; expected at most {_MAX_MISSING:.0%}; --missing lowest fills them, and --up "
+            "turns a mesh that is on its side"
+        )
     if missing == "lowest":
         return np.where(is_missing, np.nanmin(heights), heights)
     from scipy.ndimage import distance_transform_edt

@@ -36,6 +36,9 @@ often a rounding error apart, and a sample there would be on the ground between 
 _CRACK = 0.25
 """Distance to both sides within which a sample has ground if it is in a crack [steps]."""
 
+_FACING, _MIN_AREA_RATIO = 0.9, 1.3
+"""Cosine up to which a face faces an axis, and the ratio of such areas of an .obj on its side."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshSource(VertexSource):
@@ -129,12 +132,19 @@ def make_mesh_source(
 def _warn_about_up(path: Path, source: MeshSource, up: str) -> None:
     """Warn if a mesh seems to lie on its side, if `up` is the vertical axis of the file.
 
-    Ground lies flat: it is longer than high, and more of its area faces up than sideways.
+    Ground lies flat: it is longer than high, and more of its area faces up than sideways. Programs
+    write .obj files with y up or with z up, so that these need not be as high.
     """
     _, length, height = np.ptp(source.vertices, axis=0)
     a, b, c = np.moveaxis(source.vertices[source.faces], 1, 0)
-    _, along_y, along_z = np.abs(np.cross(b - a, c - a)).sum(axis=0)
-    if height >= 2 * length and along_y > 2 * along_z:
+    normals = np.abs(np.cross(b - a, c - a))
+    _, along_y, along_z = normals.sum(axis=0)
+    areas = np.linalg.norm(normals, axis=1)
+    facing_x, facing_y, facing_z = areas @ (normals > _FACING * areas[:, None])
+    is_likely = height >= 2 * length and along_y > 2 * along_z
+    if path.suffix.lower() == ".obj":
+        is_likely |= facing_y > _MIN_AREA_RATIO * max(facing_x, facing_z)
+    if is_likely:
         warn(
             f"{path} is {height:.4g} m high and {length:.4g} m wide, and most of its area is "
             f"vertical: lying on its side? --up {'z' if up == 'y' else 'y'}"

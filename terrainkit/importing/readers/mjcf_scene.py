@@ -84,6 +84,7 @@ def _read_scene(_: Path, scene: MjcfText) -> dict[str, Any]:
             used |= {geom.meshname, geom.hfieldname}
         else:  # its files may be missing
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, np.ones(3)
+            geom.fromto = np.full(6, np.nan)  # of a capsule
             geom.meshname = geom.hfieldname = ""
     for asset in [*spec.meshes, *spec.hfields]:
         if asset.name not in used:

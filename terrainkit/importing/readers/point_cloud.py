@@ -28,8 +28,8 @@ SUFFIXES = (".pcd", ".las", ".laz")
 GROUND_CLASS = 2
 """Class of the ground in LAS files, by the ASPRS."""
 
-_LENGTH_UNIT = 3076
-"""GeoTIFF key of the unit of lengths."""
+_LENGTH_UNITS = (3076, 4099)
+"""GeoTIFF keys of the units of lengths and of heights; a projected system often has one of them."""
 
 _FEET = (9002, 9003)
 """Its values for feet and US survey feet."""
@@ -191,7 +191,7 @@ def _read_las(path: Path) -> dict[str, Any]:
     cloud = laspy.read(path)
     records = cloud.header.vlrs
     keys = [key for record in records for key in getattr(record, "geo_keys", ())]
-    is_feet = any(key.id == _LENGTH_UNIT and key.value_offset in _FEET for key in keys)
+    is_feet = any(key.id in _LENGTH_UNITS and key.value_offset in _FEET for key in keys)
     texts = [getattr(record, "string", "") for record in records]
     is_feet |= any(re.search('UNIT\\["[^"]*(foot|feet|ft)', text, re.IGNORECASE) for text in texts)
     classes = np.asarray(cloud.classification)

@@ -170,7 +170,7 @@ def find_file(uri: str, folder: Path) -> Path:
     folders = [place for parent in parents for place in (parent, parent / "models")]
     listed = os.pathsep.join(os.environ.get(variable, "") for variable in _FOLDER_VARIABLES)
     folders += map(Path, filter(None, listed.split(os.pathsep)))
-    places = {"model": folders, "package": folders, "": [folder], "file": [folder]}
+    places = {"model": folders, "package": folders, "": [folder], "file": folders}
     for place in places.get(scheme, ()):
         if name and (place / name).exists():
             return place / name

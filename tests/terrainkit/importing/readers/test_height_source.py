@@ -1,12 +1,13 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import terrainkit
 from terrainkit import importing
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.readers import height_source
-from terrainkit.importing.readers.height_source import check_file, open_source
+from terrainkit.importing.readers.height_source import check_file, fill_missing, open_source
 from terrainkit.importing.readers.import_options import ReadOptions
 
 
@@ -52,3 +53,12 @@ def test_importing_has_the_names_of_terrainkit_only():
     assert importing.import_map is terrainkit.import_map
     with pytest.raises(AttributeError, match="no attribute 'import_maps'"):
         _ = importing.import_maps
+
+
+def test_fill_missing_refuses_what_is_mostly_missing():
+    heights = np.full((10, 10), np.nan)
+    heights[0, :9] = 1.0  # 91 of 100 are missing
+    places = np.arange(10.0)
+    with pytest.raises(HeightFileError, match="91 of 100 .* expected at most 90%; --missing low"):
+        fill_missing(Path("a.stl"), heights, "nearest", places, places)
+    assert (fill_missing(Path("a.stl"), heights, "lowest", places, places) == 1).all()

@@ -90,6 +90,7 @@ def test_dae_states_its_unit_and_axis(tmp_path, old, new, scale, axis):
         read(tmp_path / "a.dae", ReadOptions())
 
 
+@pytest.mark.filterwarnings("ignore:.*lying on its side")  # a wedge is no ground
 @pytest.mark.parametrize(("suffix", "options"), read_table(__file__, "mesh_file_heights_and_axes"))
 def test_mesh_file_heights_and_axes(tmp_path, suffix, options):
     mesh = wedge()
@@ -210,3 +211,12 @@ def test_mesh_that_lies_on_its_side_is_warned_of(tmp_path, size, is_warned, suff
     message = rf"10 m high and 1 m wide.*--up {other}$"
     with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
         read(tmp_path / f"a.{suffix}", ReadOptions())
+
+
+@pytest.mark.parametrize(("height", "is_warned"), [(6.6, True), (6.4, False)])
+def test_obj_with_more_area_to_one_side_is_warned_of(tmp_path, height, is_warned):
+    # The side of 9 x 6.6 faces y; the top has an area of 9 x 5, and 1.3 times this is 9 x 6.5.
+    box((9, 5, height), (0, 0, 0)).export(tmp_path / "a.obj")
+    message = "lying on its side.*--up y$"
+    with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
+        read(tmp_path / "a.obj", ReadOptions())

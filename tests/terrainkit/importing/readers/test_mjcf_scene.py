@@ -112,3 +112,13 @@ def test_copies_and_attached_models_are_ground(tmp_path):
     for x, y, z in ((0.0, 0.0, 1.0), (4.0, 0.0, 1.0), (8.0, 0.0, 1.0), (0.0, 9.0, 2.0)):
         assert source.heights(np.array([x]), np.array([y])) == pytest.approx(z)
     assert np.isnan(source.heights(np.array([2.0]), np.array([0.0])))
+
+
+def test_robots_with_capsules_between_points_are_left_out(tmp_path):
+    text = (
+        '<mujoco><worldbody><geom type="box" size="2 2 0.1"/><body name="robot"><freejoint/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 1" size="0.1"/></body></worldbody></mujoco>'
+    )
+    with pytest.warns(TerrainkitWarning, match="left out: robot"):
+        source = open_source(save(tmp_path, text), ReadOptions())
+    assert source.heights(np.zeros(1), np.zeros(1)) == pytest.approx(0.1)

@@ -140,6 +140,7 @@ def test_las_without_the_class_is_rejected(tmp_path):
     [
         (34735, np.array([1, 1, 0, 1, 3076, 0, 1, 9003], "<u2").tobytes(), True),
         (34735, np.array([1, 1, 0, 1, 3076, 0, 1, 9001], "<u2").tobytes(), False),
+        (34735, np.array([1, 1, 0, 1, 4099, 0, 1, 9003], "<u2").tobytes(), True),
         (2112, b'PROJCS["a",UNIT["US survey foot",0.3048006]]\0', True),
         (2112, b'PROJCS["a",UNIT["metre",1]]\0', False),
     ],
