@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 
 import terrainkit
 from terrainkit.feasibility import assess_map
-from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.geometry.measured_difficulty import measured_difficulty
 from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card.card import measure

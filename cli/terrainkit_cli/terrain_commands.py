@@ -189,7 +189,7 @@ class Info(PluginCommand):
 
 
 def _print_map(terrain_map: TerrainMap) -> None:
-    from terrainkit.map.measured_difficulty import measured_difficulty
+    from terrainkit.geometry.measured_difficulty import measured_difficulty
 
     config, grid = terrain_map.config, terrain_map.grid
     heights = terrain_map.heights

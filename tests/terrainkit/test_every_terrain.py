@@ -20,7 +20,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import MAX_DEMAND, assess_map
 from terrainkit.geometry.grid import Grid
-from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.geometry.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges
 from terrainkit.map.validate import validate
 from terrainkit.overlays.noise import Noise

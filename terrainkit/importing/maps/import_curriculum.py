@@ -22,6 +22,7 @@ from terrainkit.errors import (
 from terrainkit.features.gradient_noise import edge_weights
 from terrainkit.files.memory import check_memory
 from terrainkit.files.suffix import modules_by_suffix
+from terrainkit.geometry.measured_difficulty import measured_difficulty
 from terrainkit.geometry.solids import Solids
 from terrainkit.geometry.walls import file_walls
 from terrainkit.importing.maps import import_map
@@ -31,7 +32,6 @@ from terrainkit.importing.readers.height_source import Source, open_source
 from terrainkit.importing.readers.import_options import ImportOptions
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.map_config import MapConfig
-from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.geometry.measured_difficulty import measured_difficulty
 from terrainkit.geometry.solids import Solids
 from terrainkit.geometry.walls import count_walls, file_walls
 from terrainkit.importing.maps.differences import make_report
@@ -26,7 +27,6 @@ from terrainkit.map.edit import assign_solids
 from terrainkit.map.generation import pad_poses
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.map_config import MapConfig
-from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.geometry.measured_difficulty import measured_difficulty
 from tests.tables import read_table
 
 
