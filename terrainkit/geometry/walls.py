@@ -92,6 +92,15 @@ def steps_of_one_cell(heights: NDArray[np.float32], threshold: float) -> NDArray
     return bits
 
 
+def threshold_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.uint8]:
+    """Return the bits of the walls that the threshold alone gives, shape (nx, ny)."""
+    bits = np.zeros(heights.shape, np.uint8)
+    along_x, along_y = wall_edges(heights, threshold)
+    bits[:-1] |= ALONG_X * along_x
+    bits[:, :-1] |= ALONG_Y * along_y
+    return bits
+
+
 def file_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.uint8] | None:
     """Return `steps_of_one_cell`, or None if the threshold alone gives the same walls."""
     walls = steps_of_one_cell(heights, threshold)

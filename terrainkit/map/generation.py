@@ -15,6 +15,7 @@ from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.files.memory import check_memory
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.walls import ALONG_X, ALONG_Y, threshold_walls
 from terrainkit.map.layout import column_types, terrain_and_difficulty
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
@@ -110,6 +111,7 @@ class _MapBuilder:
         self._spawns = np.empty(size, dtype=object)
         self._goals = np.empty(size, dtype=object)
         self._solids: list[Solids] = []
+        self._walls: dict[tuple[int, int], NDArray[np.uint8]] = {}
 
     def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
         """Add a patch."""
@@ -127,6 +129,8 @@ class _MapBuilder:
         self._parameters[row, col] = patch.parameters
         self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
         self._solids.append(patch.solids)
+        if patch.walls is not None:
+            self._walls[row, col] = patch.walls
         deviating = patch.parameters.deviating(sub_terrain.declarations, config.cell)
         for name in deviating:
             values = patch.parameters.realized[name], patch.parameters.requested[name]
@@ -137,6 +141,14 @@ class _MapBuilder:
 
     def build(self) -> TerrainMap:
         """Return the map of all patches."""
+        walls = None
+        if self._walls:
+            walls = threshold_walls(self._heights, self._config.wall_threshold)
+            for patch, own in self._walls.items():
+                inside = walls[self._config.patch_cells(*patch)]
+                # The edges to the next patches keep the threshold.
+                inside[:-1] = inside[:-1] & ~ALONG_X | own[:-1] & ALONG_X
+                inside[:, :-1] = inside[:, :-1] & ~ALONG_Y | own[:, :-1] & ALONG_Y
         return TerrainMap(
             config=self._config,
             grid=self._grid,
@@ -149,6 +161,7 @@ class _MapBuilder:
             parameters=self._parameters,
             solids=Solids.concatenate(self._solids),
             goals=pad_poses(self._goals),
+            walls=walls,
         )
 
 

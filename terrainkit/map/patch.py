@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, plugin_errors, prefixed_errors
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.walls import file_walls
 from terrainkit.map.layout import (
     OVERLAYS_STREAM,
     SOLIDS_STREAM,
@@ -42,7 +43,7 @@ EDGE_TOLERANCE = 1e-3
 
 _LIMITS = msgspec.Meta(ge=-MAX_VALUE, le=MAX_VALUE)
 _Number = bool | Annotated[int, _LIMITS] | Annotated[float, _LIMITS]
-Values = dict[str, _Number | str | tuple[_Number, ...]]
+Values = dict[str, _Number | str | tuple[_Number | str, ...]]
 """The requested or the realized parameters of a patch, by name."""
 
 
@@ -196,7 +197,8 @@ def _build_patch(
     heights, position = geometry.heights, geometry.spawn
     solids = _place_solids(name, geometry, (row, col))
     goals = _place_goals(config, name, geometry)
-    ground = SpawnGround(config=config, grid=grid, heights=heights, solids=solids)
+    walls = file_walls(heights, config.wall_threshold) if terrain.has_file_walls else None
+    ground = SpawnGround(config=config, grid=grid, heights=heights, solids=solids, walls=walls)
     origin = ground.find_origin(name, position)
     spawns_rng = partial(child_rng, SPAWNS_STREAM)
     with plugin_errors(plugin):
@@ -217,6 +219,7 @@ def _build_patch(
         solids=solids,
         goals=goals,
         spawns=with_heading(spawns, goals, geometry.heading),
+        walls=walls,
         spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
 

@@ -77,13 +77,12 @@ class TerrainMap:
     NaN where a patch has fewer than k."""
 
     walls: NDArray[np.uint8] | None = None
-    """Which edges between neighboring samples of an imported map are walls: bit 1 of a sample for
-    the edge along x to the next one, bit 2 along y, shape `grid.shape`. None where the difference
-    of the heights decides, by `slope_threshold`."""
+    """Which edges between neighboring samples of an imported map, or one with the terrain
+    `imported`, are walls: bit 1 of a sample for the edge along x to the next one, bit 2 along y,
+    shape `grid.shape`. None where the difference of the heights decides, by `slope_threshold`."""
 
     import_reports: tuple[ImportReport, ...] = ()
-    """What an imported map lost of its file; of several files, one report for each patch, row by
-    row, in the frame of the patch. Empty for generated maps."""
+    """What an imported map lost of its file. Empty for generated maps."""
 
     def __repr__(self) -> str:
         rows, cols = self.difficulty.shape

@@ -19,7 +19,7 @@ from terrainkit.settings.text import expected_names
 from terrainkit.settings.type_hint import MAX_VALUE, convert, is_table, show
 
 Snap = Literal["none", "cells", "centered"]
-Value = float | int | bool | str | tuple[float, ...]
+Value = float | int | bool | str | tuple[float | str, ...]
 Range = tuple[float, float]
 
 MAX_COUNT = 10_000
@@ -27,6 +27,9 @@ MAX_COUNT = 10_000
 
 MAX_TEXT_LENGTH = 200
 """Longest text that a parameter accepts [characters]."""
+
+MAX_TEXTS = 64
+"""Most items of a list of texts, since a map records them for each patch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,15 +125,17 @@ class Parameter:
         if realized == requested:
             return False
         if isinstance(requested, str | tuple) or isinstance(realized, str):
-            return requested != ""  # an empty text requests nothing
+            # An empty text requests nothing, and a folder any of its files.
+            return self.easy != () and not str(realized).startswith(str(requested))
         snapping = 0.05 * requested
         if self.snap != "none":
             snapping = cell if self.snap == "centered" else cell / 2
         if self.sloped_edge:
             snapping *= 2
-        x, y = realized if isinstance(realized, tuple) else (realized, realized)
+        pair: Any = realized if isinstance(realized, tuple) else (realized, realized)
+        x, y = pair
         allowed = max(snapping, self.tolerance if x and y else 0.0)
-        return max(abs(x - requested), abs(y - requested)) > allowed + 1e-6
+        return bool(max(abs(x - requested), abs(y - requested)) > allowed + 1e-6)
 
 
 def at_difficulty(value: Any, difficulty: float) -> Any:
@@ -198,6 +203,11 @@ def text(default: str = "") -> Any:
     return _field(default, allow_range=False)
 
 
+def texts() -> Any:
+    """Declare a list of texts, empty by default, that does not depend on the difficulty."""
+    return _field((), allow_range=False)
+
+
 def choice(default: str | int, *others: str | int) -> Any:
     """Declare one of a list of names or integers that does not depend on the difficulty."""
     return _field(default, allow_range=False, choices=(default, *others))
@@ -236,7 +246,7 @@ def parameters_of(owner: type[Any]) -> Mapping[str, Parameter]:
             raise ConfigError(
                 f"{owner.__name__}: {field.name} is a plain field; expected one declared with "
                 "parameter.height, length, size, platform, grade, scalar, count, switch, text, "
-                "choice, vector or tables"
+                "texts, choice, vector or tables"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(owner)}
 
@@ -317,12 +327,15 @@ def _hint(parameter: Parameter) -> Any:
         return tuple.__class_getitem__((parameter.table, ...))
     if parameter.choices:
         return Literal[parameter.choices]
+    about = f"a string of at most {MAX_TEXT_LENGTH} characters"
+    text = Annotated[str, Meta(max_length=MAX_TEXT_LENGTH, description=about)]
+    if parameter.easy == ():
+        return Annotated[tuple[text, ...], Meta(max_length=MAX_TEXTS)]
     if isinstance(parameter.easy, tuple):
         number = Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]
         return tuple.__class_getitem__((number,) * len(parameter.easy))
     if kind is str:
-        about = f"a string of at most {MAX_TEXT_LENGTH} characters"
-        return Annotated[str, Meta(max_length=MAX_TEXT_LENGTH, description=about)]
+        return text
     if kind is bool:
         return bool
     limit = MAX_VALUE if kind is float else MAX_COUNT

@@ -41,6 +41,9 @@ class Terrain(Parameterized, ABC):
     the previous row.
     """
 
+    has_file_walls: ClassVar[bool] = False
+    """Whether a slope above `slope_threshold` that goes on stays a slope, as in an imported map."""
+
     has_random_heights: ClassVar[bool] = True
     """Whether `heights` takes random numbers. Where it does not, maps pass None: creating a
     generator takes as long as a small patch."""

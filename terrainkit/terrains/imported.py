@@ -1,8 +1,8 @@
-"""Ground from a file."""
+"""Ground from a file, or from several by difficulty."""
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar, Self
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.gradient_noise import fade_heights
 from terrainkit.geometry.grid import Grid
-from terrainkit.importing.readers.height_source import check_file
+from terrainkit.geometry.measured_difficulty import measured_difficulty
+from terrainkit.importing.readers.height_source import check_file, files_in
 from terrainkit.importing.readers.import_options import ReadOptions
 from terrainkit.importing.readers.raster import Raster, read_raster
 from terrainkit.terrain import Terrain, parameter
@@ -21,6 +22,7 @@ from terrainkit.terrain.parameter import Range, Value
 
 _EXAMPLE = Path(__file__).parent.parent / "importing" / "readers" / "example.npy"
 _EXAMPLE_CELL = 0.2
+_Status = tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,16 +31,24 @@ class Imported(Terrain):
 
     Each column has another part of the file; where the file is smaller than a patch, it is
     continued by its mirror image. The heights fade to 0 at the platform and at the edges of the
-    patch. The map depends on the file, so it records the SHA-256 of the file. Of a mesh, the ground
-    is the highest surface: solids cannot fade. `terrainkit import --solids` makes a whole map of a
-    file instead, with its overhangs.
+    patch. Of several files, the difficulty selects one: they are sorted by the measured difficulty
+    of a patch at their center. The map depends on the files, so it records the name and the SHA-256
+    of the file of each patch. Of a mesh, the ground is the highest surface: solids cannot fade.
+    `terrainkit import --solids` makes a whole map of a file instead, with its overhangs.
     """
 
     has_column_seed: ClassVar[bool] = True
+    has_file_walls: ClassVar[bool] = True
 
     file: str = parameter.text()
-    """The file, of any format that `terrainkit import` reads, relative to the working folder; empty
-    for an example of 16 m x 16 m."""
+    """The file, of any format that `terrainkit import` reads, or a folder of such files, relative
+    to the working folder; empty for an example of 16 m x 16 m."""
+
+    files: tuple[str, ...] = parameter.texts()
+    """Several files, in place of `file`."""
+
+    rank: float = parameter.scalar(0.0, 1.0)
+    """Which of several files: 0 for the easiest, 1 for the hardest."""
 
     sha256: str = parameter.text()
     """SHA-256 that the file must have; empty for any."""
@@ -71,6 +81,9 @@ class Imported(Terrain):
     missing: str = parameter.choice("nearest", "reject", "lowest")
     """Missing heights: the nearest height, an error, or the lowest height of the file."""
 
+    hole_depth: float = parameter.height(2.0)
+    """Depth of holes in the ground of a mesh [m]; 0 for missing heights."""
+
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
         """Return the terrain at `difficulty`, 0 to 1; see `Terrain.at`."""
@@ -82,45 +95,84 @@ class Imported(Terrain):
         return super().at(difficulty, values)
 
     def realized(self, grid: Grid) -> dict[str, Value]:
-        """Return the parameters, with the SHA-256 of the file."""
-        digest = self._read(grid.cell)[1] if self.file else ""
-        return {**super().realized(grid), "sha256": digest}
+        """Return the parameters, with the file of the patch and its SHA-256."""
+        values = super().realized(grid)
+        if not self.file and not self.files:
+            return values
+        path = self._path(grid)
+        digest = self._read(path, grid.cell)[1]
+        return {**values, "file": path.as_posix(), "files": (), "sha256": digest}
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return a part of the file relative to the height at its center."""
-        raster, digest = self._read(grid.cell)
+        path = self._path(grid)
+        raster, digest = self._read(path, grid.cell)
         if self.sha256 not in ("", digest):
-            raise ConfigError(
-                f"imported.sha256: got {digest} of {self.file}; expected {self.sha256}"
-            )
-        x, y = (
-            _positions(grid.shape[k], grid.cell, raster, k, rng.random())
-            if self.crop == "random"
-            else _positions(grid.shape[k], grid.cell, raster, k, 0.5)
-            for k in (0, 1)
-        )
-        ground = raster.heights(x, y)
-        relief = ground - ground[grid.shape[0] // 2, grid.shape[1] // 2]
+            raise ConfigError(f"imported.sha256: got {digest} of {path}; expected {self.sha256}")
+        is_random = self.crop == "random"
+        places = (rng.random(), rng.random()) if is_random else (0.5, 0.5)
+        relief = _relief(raster, grid.shape, grid.cell, places)
         return self.vertical_exaggeration * fade_heights(grid, relief, self.platform, 1.0)
 
-    def _read(self, cell: float) -> tuple[Raster, str]:
+    def _path(self, grid: Grid) -> Path:
+        """Return the file of the rank."""
+        if self.file and self.files:
+            raise ConfigError(f"imported.file: got {self.file} beside files; expected one of them")
+        if self.rank > 1:
+            raise ConfigError(f"imported.rank: got {self.rank:g}; expected a number from 0 to 1")
         path = Path(self.file) if self.file else _EXAMPLE
-        check_file(path)
-        side = self.file_cell or (0.0 if self.file else _EXAMPLE_CELL)
+        paths = [Path(name) for name in self.files] or [path]
+        if not self.files and path.is_dir():
+            paths = files_in(path)
+        if len(paths) == 1:
+            return paths[0]
+        # What decides the order; the factor of the heights does not.
+        common = replace(self, rank=0.0, vertical_exaggeration=1.0)
+        files = tuple((path, _status(path)) for path in paths)
+        ranked = _ranked(common, files, grid.shape, grid.cell)
+        return ranked[round(self.rank * (len(ranked) - 1))]
+
+    def _read(self, path: Path, cell: float) -> tuple[Raster, str]:
+        """Return the heights of a file, and its SHA-256."""
+        side = self.file_cell or (_EXAMPLE_CELL if path == _EXAMPLE else 0.0)
         options = ReadOptions(
             file_cell=(side, self.file_cell_y or side) if side else None,
             height_range=(0.0, self.height_span) if self.height_span else None,
             scale=self.scale or None,
             up=self.up,  # type: ignore[arg-type]
+            hole_depth=self.hole_depth,
         )
-        status = path.stat()
-        return _read_file(path, (status.st_mtime_ns, status.st_size), options, self.missing, cell)
+        return _read_file(path, _status(path), options, self.missing, cell)
+
+
+def _status(path: Path) -> _Status:
+    """Return what shows that a file has changed."""
+    check_file(path)
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=8)
+def _ranked(
+    terrain: Imported,
+    files: tuple[tuple[Path, _Status], ...],
+    shape: tuple[int, int],
+    cell: float,
+) -> tuple[Path, ...]:
+    """Return files by the measured difficulty of a patch at their center, the easiest first."""
+
+    def order(path: Path) -> tuple[float, str, Path]:
+        relief = _relief(terrain._read(path, cell)[0], shape, cell, (0.5, 0.5))
+        difficulty = measured_difficulty(relief.astype(np.float32), cell, 0.0)
+        return round(difficulty, 6), path.name, path
+
+    return tuple(sorted((path for path, _ in files), key=order))
 
 
 @lru_cache(maxsize=8)
 def _read_file(
     path: Path,
-    status: tuple[int, int],  # noqa: ARG001 - a file that changes is read again
+    status: _Status,  # noqa: ARG001 - a file that changes is read again
     options: ReadOptions,
     missing: str,
     cell: float,
@@ -129,6 +181,32 @@ def _read_file(
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     return read_raster(path, options, missing, cell), digest  # type: ignore[arg-type]
+
+
+def _relief(
+    raster: Raster, shape: tuple[int, int], cell: float, places: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Return the heights of a part of a file relative to its center, shape `shape` [m].
+
+    Args:
+        raster: Heights of the file.
+        shape: Samples along x and y.
+        cell: Distance between two samples [m].
+        places: Where the part begins along x and y, as of `_positions`.
+    """
+    x, y = (_positions(shape[k], cell, raster, k, places[k]) for k in (0, 1))
+    ground = raster.heights(x, y)
+    level = ground[shape[0] // 2, shape[1] // 2]
+    if raster.holes is not None:
+        i, j = (
+            ((p - low) / raster.cell).astype(int)
+            for p, low in zip((x, y), raster.lower, strict=True)
+        )
+        is_hole = raster.holes[np.ix_(i, j)]
+        # At a hole in the center, the platform is as high as the ground around.
+        if is_hole[shape[0] // 2, shape[1] // 2] and not is_hole.all():
+            level = np.median(ground[~is_hole])
+    return np.asarray(ground - level)
 
 
 def _positions(

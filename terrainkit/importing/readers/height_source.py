@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError, TerrainkitWarning, install_command
+from terrainkit.errors import HeightFileError, TerrainkitWarning, install_command, listing
 from terrainkit.files.child_process import ProcessError, ProcessLimits, run_in_process
-from terrainkit.files.suffix import find_module
+from terrainkit.files.suffix import find_module, modules_by_suffix
 from terrainkit.importing.readers.import_options import Missing, ReadOptions
 from terrainkit.settings.toml_text import parse_toml, read_text
 
@@ -114,6 +114,19 @@ def open_source(path: Path, options: ReadOptions) -> Source:
     check_file(path)
     source: Source = reader.read(path, options)
     return source
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that have a reader, sorted by name.
+
+    Raises:
+        HeightFileError: if there is none.
+    """
+    readers = modules_by_suffix("terrainkit.importing.readers")
+    files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in readers]
+    if not files:
+        raise HeightFileError(f"{folder}: got no file to import; expected {listing(readers)}")
+    return files
 
 
 def check_file(path: Path) -> None:

@@ -51,6 +51,9 @@ class Raster:
     lower: tuple[float, float] = (0.0, 0.0)
     """Corner of cell (0, 0) with the smallest x and y [m]."""
 
+    holes: NDArray[np.bool_] | None = None
+    """Samples in a hole of a mesh, shape (nx, ny); None where there is none."""
+
     is_metric: ClassVar[bool] = True
 
     @property
@@ -139,9 +142,14 @@ def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float)
         for low, count in zip(source.lower, counts, strict=True)
     )
     # Only a mesh, which has no cell, has holes.
-    heights, _ = dig_holes(source.heights(x, y), 0.0 if source.cell else options.hole_depth)
+    heights, holes = dig_holes(source.heights(x, y), 0.0 if source.cell else options.hole_depth)
     heights = fill_missing(path, heights, missing, x, y)
-    return Raster(values=heights.astype(np.float32), spacing=(cell, cell), lower=source.lower)
+    return Raster(
+        values=heights.astype(np.float32),
+        spacing=(cell, cell),
+        lower=source.lower,
+        holes=holes if holes.any() else None,
+    )
 
 
 def make_raster(

@@ -17,9 +17,18 @@ def test_terrain_doc_has_text_and_unit(name):
     assert about.text.partition("\n")[0].endswith("."), "the first line lacks a period"
     requested = registry.get_terrain(name).at(0).requested()
     assert [p.name for p in about.parameters] == [each for each in requested if "." not in each]
-    unitless = {"grade", "opening", "opened", "vertical_exaggeration", "scale", "elements", "trees"}
+    unitless = {
+        "grade",
+        "opening",
+        "opened",
+        "vertical_exaggeration",
+        "rank",
+        "scale",
+        "elements",
+        "trees",
+    }
     declared = parameters_of(registry.get_terrain(name))
-    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | int)}
+    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | int | tuple)}
     for each in about.parameters:
         assert each.text.endswith("."), f"{each.name}: expected a docstring that ends with a period"
         has_unit = "[m]" in each.text or "[rad]" in each.text

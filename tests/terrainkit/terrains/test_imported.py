@@ -132,3 +132,68 @@ def test_imported_rejects_solids():
     message = r"^imported\.solids: .* terrainkit import --solids keeps the overhangs"
     with pytest.raises(ConfigError, match=message):
         tk.SubTerrain(terrain="imported", parameters={"solids": True})
+
+
+def test_imported_folder_is_sorted_by_difficulty_beside_other_terrains(tmp_path):
+    for name, steps in (("a", 0.1), ("b", 0.3)):
+        heights = plane((80, 80), 0.1) * 0
+        heights[::8] = steps
+        np.save(tmp_path / f"{name}.npy", heights)
+    parameters = {"file": str(tmp_path), "file_cell": 0.1, "vertical_exaggeration": 1.0}
+    terrains = (
+        tk.SubTerrain(terrain="imported", parameters=parameters),
+        tk.SubTerrain(terrain="stairs"),
+    )
+    terrain_map = tk.generate(tk.MapConfig(rows=3, cols=2, border=1.0, terrains=terrains))
+    # Round to even: rank 0.5 of two files is the first.
+    names = [Path(each.realized["file"]).name for each in terrain_map.parameters[:, 0]]
+    assert names == ["a.npy", "a.npy", "b.npy"]
+    assert "file" not in terrain_map.parameters[0, 1].realized
+    assert validate(terrain_map) == []
+    for values, message in (
+        ({"rank": 2.0}, r"imported\.rank: got 2; expected a number from 0 to 1"),
+        ({"files": ["a.npy"]}, r"imported\.file: got .* beside files; expected one of them"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            heights_of(Imported(**parameters | values))
+
+
+def test_imported_steep_slopes_stay_slopes(save):
+    # A roof of 45 degrees, 1 m high, and a block of 1 m, away from the platform and the edges.
+    heights = np.zeros((160, 160))
+    heights[15:36, 60:100] = 0.1 * np.minimum(np.arange(21), np.arange(21)[::-1])[:, None]
+    heights[120:130, 60:100] = 1.0
+    parameters = save(heights, crop="center", vertical_exaggeration=1.0)
+    config = tk.MapConfig(
+        rows=1,
+        cols=2,
+        patch_size=(16.0, 16.0),
+        border=1.0,
+        terrains=(
+            tk.SubTerrain(terrain="imported", parameters=parameters),
+            tk.SubTerrain(terrain="stairs"),
+        ),
+    )
+    terrain_map = tk.generate(config)
+    cells = config.patch_cells(0, 0)
+    along_x, along_y = (terrain_map.walls[cells] & bit > 0 for bit in (1, 2))
+    assert not along_x[15:36, 70].any()
+    assert np.flatnonzero(along_x[:, 70]).tolist() == [119, 129]
+    assert np.flatnonzero(along_y[125]).tolist() == [
+        59,
+        99,
+        159,
+    ]  # the last is the side of the stairs
+    stairs = terrain_map.walls[config.patch_cells(0, 1)]
+    by_threshold = tk.generate(
+        tk.MapConfig(rows=1, cols=1, patch_size=(16.0, 16.0), terrains=config.terrains[1:])
+    )
+    assert by_threshold.walls is None
+    threshold = config.wall_threshold
+    steps = np.abs(np.diff(terrain_map.patch(0, 1).heights, axis=0)) > threshold
+    assert np.array_equal(stairs[:-1] & 1 > 0, steps)
+    alone, whole = tk.make_patch(config, 0, 0), terrain_map.patch(0, 0)
+    assert np.array_equal(alone.heights, whole.heights)
+    assert np.array_equal(alone.walls[:-1, :-1], whole.walls[:-1, :-1])
+    assert tk.make_patch(config, 0, 1).walls is None
+    assert validate(terrain_map) == []

@@ -60,6 +60,9 @@ def test_import_whole_file_is_one_patch_that_records_it(tmp_path):
         "scale": 0.0,
         "up": "auto",
         "missing": "nearest",
+        "files": (),
+        "rank": 0.0,
+        "hole_depth": 2.0,
         "crop": "random",
         "platform": 2.0,
     }
