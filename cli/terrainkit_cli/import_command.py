@@ -8,11 +8,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
-from terrainkit.errors import ConfigError
 from terrainkit.importing.readers.import_options import ImportOptions
-from terrainkit.settings.type_hint import NonNegative
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath, is_map
 from terrainkit_cli.config_options import ConfigCommand
@@ -20,13 +16,10 @@ from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import positional
 
 if TYPE_CHECKING:
-    from terrainkit import ImportReport
+    from terrainkit import ImportReport, TerrainMap
 
-_MAX_LINES = 20
-"""Most lines of the report of several files."""
-
-_EQUAL = "all within 1 cm"
-"""What the report of a single file says where nothing differs."""
+_MAX_ROWS = 20
+"""Most rows whose files are printed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +27,7 @@ class Import(ConfigCommand):
     """Import heights, meshes or point clouds as a map.
 
     Several files, or the files in a folder, become levels of difficulty: the rows, easiest first.
+    terrainkit generate makes such a map again from its config.
     The report compares the map with the file at points that are not its samples. It gives the
     largest differences, ground that the file does not have, and parts that are lost because they
     are narrower than a cell or hang over the ground.
@@ -51,10 +45,6 @@ class Import(ConfigCommand):
     overwrite: bool = False
     """Replace an existing file."""
 
-    blend: NonNegative = 1.0
-    """Several files: distance over which the heights fade to 0 at the edges of a patch [m]; 0 to
-    keep them."""
-
     @classmethod
     def default_config(cls) -> ImportOptions:
         """Return the default options."""
@@ -67,34 +57,33 @@ class Import(ConfigCommand):
         options: ImportOptions = self.changed_config()
         export.check_export(self.output, 0, overwrite=self.overwrite)
         if len(self.files) == 1 and not self.files[0].is_dir():
-            if self.blend != Import.blend:
-                raise ConfigError("--blend: got one file; expected several files")
             progress = partial(render.progress, of="steps")
             terrain_map = import_map(self.files[0], options, progress=progress).terrain_map
-            names = [""]
+            lines = [*_report_lines(terrain_map.import_reports[0], options)]
         else:
-            progress = partial(render.progress, of="files")
-            terrain_map = import_curriculum(
-                self.files, options, blend=self.blend, progress=progress
-            )
-            patches = np.ndenumerate(terrain_map.patch_names)
-            names = [f"patch {index}, {name}: " for index, name in patches]
+            terrain_map = import_curriculum(self.files, options, progress=render.progress)
+            lines = [*_row_lines(terrain_map)]
         files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, *files))
-        lines = [
-            f"{name}{line}"
-            for name, report in zip(names, terrain_map.import_reports, strict=True)
-            for line in _report_lines(report, options)
-            if not name or not line.endswith(_EQUAL)
-        ]
-        for line in lines[:_MAX_LINES]:
+        for line in lines:
             render.result(line)
-        if len(lines) > _MAX_LINES:
-            render.result(f"and {len(lines) - _MAX_LINES} more, in import_reports")
         if is_map(self.output):
             path = quote(str(self.output))
             render.result(f"next: terrainkit preview {path} -o preview.png  (render it)")
         return 0
+
+
+def _row_lines(terrain_map: "TerrainMap") -> Iterator[str]:
+    """Yield the file of each row, and what differs from all of them."""
+    rows = [parameters.realized["file"] for parameters in terrain_map.parameters[:, 0]]
+    for row, file in enumerate(rows[:_MAX_ROWS]):
+        yield f"row {row}: {Path(file).name}"
+    if len(rows) > _MAX_ROWS:
+        yield f"and {len(rows) - _MAX_ROWS} more; terrainkit info prints them"
+    yield (
+        "heights are relative to the center of a patch and fade to 0 at its platform and its "
+        "edges; a mesh has its highest surface only"
+    )
 
 
 def _report_lines(report: "ImportReport", options: ImportOptions) -> Iterator[str]:
@@ -147,7 +136,7 @@ def _lost_parts(report: "ImportReport", options: ImportOptions) -> Iterator[str]
 
 def _differences(report: "ImportReport") -> str:
     if not report.max_error_at or report.max_error <= 0.01:
-        return _EQUAL
+        return "all within 1 cm"
     shares: dict[float, str] = {}
     for share, limit in zip(report.shares, ("1 cm", "5 cm", "a cell"), strict=True):
         shares.setdefault(share, f"{math.floor(1000 * share) / 10:g}% within {limit}")

@@ -228,13 +228,15 @@ def _print_map(terrain_map: TerrainMap) -> None:
 
 def _print_sources(terrain_map: TerrainMap) -> None:
     """Print the files that an imported map is made of, and the patches of each."""
-    rows = [("file", "SHA-256", "patches")]
-    for k in range(len(terrain_map.terrain_names)):
-        patches = [(row, col) for row, col in np.argwhere(terrain_map.terrain_types == k).tolist()]
-        record = terrain_map.parameters[patches[0]].realized if patches else {}
+    sources: dict[tuple[str, str], list[tuple[int, ...]]] = {}
+    for patch, parameters in np.ndenumerate(terrain_map.parameters):
+        record = parameters.realized
         if digest := record.get("sha256"):
-            others = f" and {len(patches) - 5} more" if len(patches) > 5 else ""
-            rows.append((str(record["file"]), str(digest), f"{str(patches[:5])[1:-1]}{others}"))
+            sources.setdefault((record["file"], digest), []).append(patch)
+    rows = [("file", "SHA-256", "patches")]
+    for source, patches in sources.items():
+        others = f" and {len(patches) - 5} more" if len(patches) > 5 else ""
+        rows.append((*source, f"{str(patches[:5])[1:-1]}{others}"))
     if len(rows) > 1:
         render.result("")
         render.table(rows)

@@ -98,18 +98,7 @@ def fade_heights(
         platform: Side of the flat square at the center [m].
         blend: Distance over which the heights fade [m].
     """
-    return np.asarray(
-        heights * edge_weights(grid, blend) * grid.fade(grid.centered(platform), blend)
-    )
-
-
-def edge_weights(grid: Grid, blend: float) -> NDArray[np.float64]:
-    """Return weights that are 0 at the outermost cells and 1 from `blend` on, shape `grid.shape`.
-
-    Args:
-        grid: Grid of the patch.
-        blend: Distance over which the weights rise [m].
-    """
     x, y = (np.minimum(np.arange(n), np.arange(n)[::-1]) for n in grid.shape)
     from_edge = np.minimum.outer(x, y) * (grid.cell / max(blend, grid.cell))
-    return np.asarray(np.minimum(from_edge, 1.0))
+    edge_weights = np.minimum(from_edge, 1.0)
+    return np.asarray(heights * edge_weights * grid.fade(grid.centered(platform), blend))

@@ -69,19 +69,21 @@ def test_import_folder_prints_its_sources(terrainkit, rejected, tmp_path):
     words = ("import", "scans", "--file-cell", 0.1, "--missing", "nearest", "-o")
     run = terrainkit(*words, "a.npz")
     assert run.returncode == 0
-    assert "2 of 2 patches have missing heights, such as 1 of scans/gentle.npy" in run.stderr
+    assert "scans/gentle.npy: 1 of 400 heights are missing" in run.stderr
     assert "wrote a.npz: 2 x 1 patches of 2 m x 2 m" in run.stdout
-    assert "patch (0, 0), gentle.npy: filled missing heights: 1; " in run.stdout
-    assert "compared with" not in run.stdout  # nothing differs
+    assert "row 0: gentle.npy\nrow 1: steep.npy\nheights are relative to" in run.stdout
     info = terrainkit("info", "a.npz").stdout.splitlines()
     assert info[-3].split() == ["file", "SHA-256", "patches"]
-    assert info[-2].split()[0::2] == ["gentle.npy", "(0,"]
+    assert info[-2].split()[0::2] == ["scans/gentle.npy", "(0,"]
+    assert terrainkit("generate", "--config", "a.npz", "-o", "again.npz").returncode == 0
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
     assert terrainkit("check-map", "a.npz").returncode == 0
     files = ("scans/steep.npy", "scans/gentle.npy")
     assert terrainkit("import", *files, *words[2:], "b.npz").returncode == 0
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    error = rejected("import scans/steep.npy -o c.npz --blend 0")
-    assert error.startswith("--blend: got one file")
+    a, b = (tk.TerrainMap.load(tmp_path / f"{name}.npz").heights for name in "ab")
+    assert np.array_equal(a, b)
+    error = rejected(*words, "c.npz", "--solids")
+    assert error == "solids: got True for several files; expected one file, alone\n"
     assert rejected("import -o c.npz") == "FILE...: missing; see terrainkit import --help\n"
 
 

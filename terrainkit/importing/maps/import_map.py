@@ -31,6 +31,7 @@ from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.parameter import MAX_TEXT_LENGTH
+from terrainkit.terrain.patch_geometry import uniform_friction
 from terrainkit.terrain.sub_terrain import SubTerrain
 
 StepProgress = Callable[[Iterator[Any], int], Iterator[Any]]
@@ -55,9 +56,6 @@ class ImportedMap:
 
     report: ImportReport
     """The differences."""
-
-    holes: NDArray[np.bool_]
-    """Samples of the map that are in a hole of a mesh."""
 
 
 def import_map(
@@ -98,8 +96,7 @@ def _import_steps(path: Path, options: ImportOptions) -> Iterator[Any]:
     source = open_source(path, options)
     yield None
     check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
-    terrain = sub_terrain(path, path.stem, options)
-    config, origin = make_config(path, source, options, terrain)
+    config, origin = _make_config(path, source, options)
     check_samples(path, source, config.cell, math.prod(config.grid.shape))
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
@@ -163,7 +160,24 @@ def make_map(
     relax = options.spawn_tolerance is None
     walls = file_walls(heights, config.wall_threshold)
     config, spawns = place_spawns(config, heights, solids, walls, holes, spawn_xy, relax=relax)
-    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, walls, friction)
+    # Several sub-terrains are names of columns: all have the same parameters.
+    record = config.sub_terrains[0].at(0.0).requested()
+    terrain_map = TerrainMap(
+        config=config,
+        grid=grid,
+        heights=heights,
+        walls=walls,
+        friction=uniform_friction(config.static_friction, grid.shape)
+        if friction is None
+        else friction,
+        spawns=pad_poses(spawns),
+        terrain_types=terrain_types,
+        terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
+        difficulty=_difficulty(config, heights, spawns),
+        parameters=np.full(spawns.shape, PatchParameters(requested=record, realized=record)),
+        solids=solids,
+        goals=np.empty((*spawns.shape, 0, 4), dtype=np.float32),
+    )
     if walls is not None:
         num_walls = count_walls(heights, walls)
         num_steep = count_walls(heights, config.wall_threshold)
@@ -172,11 +186,11 @@ def make_map(
     yield None
     report = make_report(terrain_map, source, origin, columns, holes, **counts)
     terrain_map = replace(terrain_map, import_reports=(report,))
-    yield ImportedMap(terrain_map=terrain_map, report=report, holes=holes)
+    yield ImportedMap(terrain_map=terrain_map, report=report)
 
 
-def make_config(
-    path: Path, source: Source, options: ImportOptions, terrain: SubTerrain
+def _make_config(
+    path: Path, source: Source, options: ImportOptions
 ) -> tuple[MapConfig, NDArray[np.float64]]:
     """Return the configuration of the map, and its origin in the file.
 
@@ -184,7 +198,6 @@ def make_config(
         path: The file, for errors.
         source: The ground.
         options: How the file becomes a map.
-        terrain: The terrain of all patches.
 
     Raises:
         ConfigError: if the patches do not fit in the file.
@@ -213,13 +226,16 @@ def make_config(
             )
         counts.append(count)
         sizes.append(size)
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    record = {"file": path.name[:MAX_TEXT_LENGTH], "sha256": digest, **read_settings(options)}
     config = MapConfig(
         rows=counts[0],
         cols=counts[1],
         patch_size=(sizes[0], sizes[1]),
         cell=cell,
         border=options.border,
-        terrains=(terrain,),
+        terrains=(SubTerrain(terrain="imported", name=path.stem, parameters=record),),
         mode="custom",
         **map_settings(options),
     )
@@ -234,73 +250,29 @@ def map_settings(options: ImportOptions) -> dict[str, Any]:
     return {**{name: getattr(options, name) for name in names}, "spawn_tolerance": tolerance}
 
 
-def sub_terrain(path: Path, name: str, options: ImportOptions) -> SubTerrain:
-    """Return the terrain that records the file and how it was read."""
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+def read_settings(options: ImportOptions) -> dict[str, Any]:
+    """Return the options that are parameters of the terrain `imported` as well."""
     low, high = options.height_range or (0.0, 0.0)
     x, y = options.file_spacing or (0.0, 0.0)
-    return SubTerrain(
-        terrain="imported",
-        name=name,
-        parameters={
-            "file": path.name[:MAX_TEXT_LENGTH],
-            "sha256": digest,
-            "vertical_exaggeration": 1.0,
-            "file_cell": x,
-            "file_cell_y": 0.0 if y == x else y,
-            "height_span": abs(high - low),
-            "scale": options.scale or 0.0,
-            "up": options.up,
-            "missing": options.missing,
-        },
-    )
+    return {
+        "vertical_exaggeration": 1.0,
+        "file_cell": x,
+        "file_cell_y": 0.0 if y == x else y,
+        "height_span": abs(high - low),
+        "scale": options.scale or 0.0,
+        "up": options.up,
+        "missing": options.missing,
+        "hole_depth": options.hole_depth,
+    }
 
 
-def assemble_map(
-    config: MapConfig,
-    heights: NDArray[np.float32],
-    solids: Solids,
-    spawns: NDArray[np.object_],
-    terrain_types: NDArray[np.int32],
-    walls: NDArray[np.uint8] | None,
-    friction: NDArray[np.float32] | None = None,
-) -> TerrainMap:
-    """Return a map of mode custom, whose difficulty is the rank by measured difficulty.
-
-    Args:
-        config: Configuration of the map.
-        heights: Heights of the map [m].
-        solids: Solids of the map.
-        spawns: Spawn positions of each patch, as `place_spawns` returns them.
-        terrain_types: Sub-terrain of each patch, shape (rows, cols).
-        walls: Walls of the map, as in `TerrainMap.walls`.
-        friction: Friction coefficients of the ground on the samples of the map; None for the
-            default.
-    """
-    size = (config.rows, config.cols)
-    parameters, measured = np.empty(size, dtype=object), np.empty(size)
-    records = [sub_terrain.at(0.0).requested() for sub_terrain in config.sub_terrains]
-    for row, col in np.ndindex(size):
-        record = records[terrain_types[row, col]]
-        parameters[row, col] = PatchParameters(requested=record, realized=record)
-        block = heights[config.patch_cells(row, col)]
-        start = float(spawns[row, col][0, 2])
-        measured[row, col] = measured_difficulty(block, config.cell, start)
-    rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
-    return TerrainMap(
-        config=config,
-        grid=config.grid,
-        heights=heights,
-        walls=walls,
-        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape)
-        if friction is None
-        else friction,
-        spawns=pad_poses(spawns),
-        terrain_types=terrain_types,
-        terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
-        difficulty=(rank / max(1, rank.max())).astype(np.float32),
-        parameters=parameters,
-        solids=solids,
-        goals=np.empty((*size, 0, 4), dtype=np.float32),
-    )
+def _difficulty(
+    config: MapConfig, heights: NDArray[np.float32], spawns: NDArray[np.object_]
+) -> NDArray[np.float32]:
+    """Return the rank of each patch by measured difficulty, 0 to 1, shape (rows, cols)."""
+    measured = [
+        measured_difficulty(heights[config.patch_cells(*k)], config.cell, float(spawns[k][0, 2]))
+        for k in np.ndindex(spawns.shape)
+    ]
+    rank = np.unique(np.round(measured, 6), return_inverse=True)[1].reshape(spawns.shape)
+    return np.asarray(rank / max(1, rank.max()), dtype=np.float32)
