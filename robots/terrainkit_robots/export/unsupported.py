@@ -26,6 +26,10 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
         for what, number in ignored.items()
         if number > 0
     ]
+    only_mjcf = {"loop": model.loops, "coupling": model.couplings, "tendon": model.tendons}
+    lacking = [count(len(found), what) for what, found in only_mjcf.items() if found]
+    if lacking:
+        changes.append(f"robot.urdf lacks {names(lacking)} of robot.xml, which URDF cannot have")
     unused = [actuator.name for actuator in model.actuators if not actuator.joint]
     if unused:
         changes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")
