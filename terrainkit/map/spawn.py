@@ -128,6 +128,8 @@ class SpawnGround:
                 expected = (
                     f"larger patches, less spawn_headroom or a spawn_radius below {largest:.2g} m"
                 )
+                if self.holes is not None and self.holes.any():
+                    expected += ", or hole_depth 0: no robot starts in a hole"
             raise ConfigError(
                 f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
                 f"{config.spawn_tolerance:g} m and free of solids up to "

@@ -3,6 +3,7 @@ import pytest
 import trimesh
 
 import terrainkit as tk
+from terrainkit.errors import ConfigError
 from terrainkit.feasibility import RobotLimits, assess_map
 from terrainkit.importing import ImportOptions, import_map, import_terrain_mesh
 from terrainkit.map.validate import validate
@@ -111,6 +112,13 @@ def test_holes_below_bodies_that_became_solids(tmp_path):
     imported = import_map(save(tmp_path, parts), ImportOptions(solids=True))
     assert imported.terrain_map.height([4.2, 2.0]) == -2.0
     assert imported.terrain_map.scan([4.2, 2.0, 5.0]) == pytest.approx(0.3)
+
+
+def test_error_of_walls_without_ground_names_the_holes(tmp_path):
+    walls = [box((4, 0.3, 1), (2, y, 0.5)) for y in (0.15, 3.85)]
+    walls += [box((0.3, 4, 1), (x, 2, 0.5)) for x in (0.15, 3.85)]
+    with pytest.raises(ConfigError, match=r"or hole_depth 0: no robot starts in a hole$"):
+        import_map(save(tmp_path, walls))
 
 
 def test_holes_of_meshes_of_frameworks_and_of_curricula(tmp_path):
