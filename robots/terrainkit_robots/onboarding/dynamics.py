@@ -14,7 +14,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import names
+from terrainkit_robots.text import count, names
 from terrainkit_robots.transforms import Matrix
 
 _NUM_STATES = 30
@@ -83,6 +83,9 @@ def dynamics_differences(
     if not joint_names:
         return tuple(found)
     found += _limit_differences(joint_names, sides)
+    on_joint = source.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    if source.nu and not on_joint.all():
+        found.append(f"without {count(int((~on_joint).sum()), 'actuator')} of tendons or bodies")
     worst: dict[str, tuple[float, str]] = {}
     with quiet_mujoco():
         for side in sides:

@@ -28,20 +28,17 @@ def load_source(facts: Facts) -> Any:
     import mujoco
 
     file = facts.model.file
-    texts = {
-        os.path.relpath(path, file.parent): facts.meshes.data(path)
-        for path in facts.model.sources
-        if facts.meshes.has_contents(path)
-    }
+    meshes = facts.meshes
     try:
+        texts = {  # with the repairs; from_string finds no files
+            os.path.relpath(path, file.parent): meshes.data(path)
+            if meshes.has_contents(path)
+            else read_bytes(path)
+            for path in facts.model.sources
+        }
         with quiet_mujoco():
-            if texts:  # with the repairs, from_string finds no other files
-                for path in facts.model.sources:
-                    texts.setdefault(os.path.relpath(path, file.parent), read_bytes(path))
-                spec = mujoco.MjSpec.from_string(texts[file.name].decode(), include=texts)
-                spec.modelfiledir = str(file.parent)
-            else:
-                spec = mujoco.MjSpec.from_file(str(file))
+            spec = mujoco.MjSpec.from_string(texts[file.name].decode(), include=texts)
+            spec.modelfiledir = str(file.parent)
             remove_drawings(spec)  # their meshes may be missing
             return spec.compile()
     except (ValueError, RuntimeError, RobotFileError, mujoco.FatalError) as error:

@@ -1,6 +1,7 @@
 """Weld the joints of a simulation model."""
 
 from collections.abc import Mapping
+from itertools import chain
 
 import numpy as np
 
@@ -20,7 +21,8 @@ def weld_joints(sim: SimModel, positions: Mapping[str, float]) -> SimModel:
     data = mujoco.MjData(model)
     data.qpos[:] = sim.qpos_at(positions)
     mujoco.mj_kinematics(model, data)
-    for element in (*spec.actuators, *spec.sensors, *spec.equalities, *spec.keys):
+    sections = spec.actuators, spec.sensors, spec.equalities, spec.tendons, spec.keys
+    for element in chain.from_iterable(sections):
         spec.delete(element)
     for body in spec.bodies:
         joints = [joint for joint in body.joints if joint.type != mujoco.mjtJoint.mjJNT_FREE]

@@ -155,8 +155,10 @@ def remove_drawings(spec: Any) -> None:
     for element in [*spec.sensors, *spec.cameras, *spec.lights]:
         spec.delete(element)
     used = set()
+    targets = {wrap.target.name for tendon in spec.tendons for wrap in tendon.path if wrap.target}
+    needed = paired | targets - {""}
     for geom in list(spec.geoms):
-        drawn = not (geom.contype or geom.conaffinity or geom.name in paired)
+        drawn = not (geom.contype or geom.conaffinity or geom.name in needed)
         if drawn and (geom.parent.explicitinertial or geom.parent == spec.worldbody):
             spec.delete(geom)
         else:

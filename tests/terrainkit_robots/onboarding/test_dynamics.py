@@ -94,3 +94,23 @@ def test_constraints_that_hold_the_robot_are_left_out(tmp_path):
     assert load_robot(tmp_path / "m.xml").left_out == (
         "the constraint rope, which closes no loop of the robot",
     )
+
+
+def test_joint_with_a_motor_is_no_mimic(tmp_path):
+    source = SOURCE.format(weld="").replace(
+        "</actuator>", '<motor name="me" joint="je"/></actuator>'
+    )
+    (tmp_path / "m.xml").write_text(source)
+    robot = load_robot(tmp_path / "m.xml")
+    assert [coupling.follower for coupling in robot.couplings] == ["jd", "je", "cable"]
+    assert all(joint.mimic is None for joint in robot.joints)
+
+
+def test_actuators_of_tendons_are_named(written):
+    source, result = written
+    text = source.read_text().replace("</actuator>", '<motor name="pull" tendon="sum"/></actuator>')
+    models = (
+        mujoco.MjModel.from_xml_string(text),
+        mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml")),
+    )
+    assert dynamics_differences(*models) == ("without 1 actuator of tendons or bodies",)

@@ -7,6 +7,7 @@ hexapods, arms, hands, drones and cars, with their own names and with meaningles
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -256,7 +257,9 @@ def _join_loops(
             k
             for index in loop
             if (side := [k for k, chain in enumerate(chains) if index in chain.chain])
-            and not any(_is_mirror_image(chains[a], chains[b], size) for a in side for b in side)
+            and not any(
+                _is_mirror_image(chains[a], chains[b], size) for a, b in combinations(side, 2)
+            )
             for k in side
         }
         before = {numbers[k] for k in joined if k in numbers}

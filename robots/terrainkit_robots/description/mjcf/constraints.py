@@ -90,6 +90,7 @@ class Constraints:
 
         self._node_of, self._link_names = node_of, link_names
         self._world_pose, self._site_pose = world_pose, site_pose
+        self._driven = {actuator.target for actuator in spec.actuators}
         self._joints = {joint.name: joint for joint in spec.joints if joint.name}
         self._bodies = {body.name: body for body in spec.bodies if body.name}
         self._sites = {site.name: site for site in spec.sites if site.name}
@@ -118,7 +119,8 @@ class Constraints:
         shift = Polynomial([0.0 if target is None else -_reference(target), 1.0])
         moved = (Polynomial(values)(shift) + _reference(follower)).coef
         offset, multiplier, *higher = np.pad(moved, (0, 5 - len(moved))).tolist()
-        if target is not None and not any(higher):
+        is_taken = equality.name1 in self.mimics or equality.name1 in self._driven
+        if target is not None and not any(higher) and not is_taken:
             self.mimics[equality.name1] = Mimic(
                 source=self._node_of(equality).source,
                 joint=equality.name2,
