@@ -6,7 +6,7 @@ off. Joints are compared by name, and forces on the joints only, unless both bas
 
 import copy
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,9 +76,11 @@ def dynamics_differences(
     """
     import mujoco
 
-    joint_names, sides = pair_models(source, written)
-    kept = {*joint_names, *base_joints, ""}
-    missing = [name for name in _joint_names(source) if name not in kept]
+    source_names = dict.fromkeys(joint_names_of(source))
+    joint_names = [name for name in joint_names_of(written) if name in source_names]
+    sides = make_side(source, joint_names), make_side(written, joint_names)
+    kept = {*joint_names, *base_joints}
+    missing = [name for name in source_names if name not in kept]
     found = [f"without the joints {names(missing, max_count=4)}"] if missing else []
     if not joint_names:
         return tuple(found)
@@ -89,16 +91,7 @@ def dynamics_differences(
     worst: dict[str, tuple[float, str]] = {}
     with quiet_mujoco():
         for side in sides:
-            flags = mujoco.mjtDisableBit
-            names_off = ("CONTACT", "LIMIT", "FRICTIONLOSS", "CLAMPCTRL")
-            off = (int(getattr(flags, f"mjDSBL_{name}")) for name in names_off)
-            side.model.opt.disableflags = sum(off)
-            side.model.actuator_forcelimited[:] = 0
-            side.model.jnt_actfrclimited[:] = 0
-            side.model.opt.gravity[:] = (0, 0, -GRAVITY)
-            side.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-            # The time step limits how stiff constraints are.
-            side.model.opt.timestep = written.opt.timestep
+            _isolate(side, written.opt.timestep)
         for state in _states(*sides, compare_actuators=compare_actuators):
             for name, (value, other) in state.items():
                 error = np.abs(value - other)
@@ -120,36 +113,51 @@ _QUANTITIES = (
 )
 
 
-def _joint_names(model: Any) -> list[str]:
-    """Return the names of the hinges and slides of a model."""
+def _isolate(side: Side, time_step: float) -> None:
+    """Turn off contacts, limits and friction, and use gravity and time step of both models."""
     import mujoco
 
-    moving = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
-    return [model.joint(k).name for k in np.flatnonzero(moving)]
+    options = side.model.opt
+    flags = ("CONTACT", "LIMIT", "FRICTIONLOSS", "CLAMPCTRL")
+    off = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")) for flag in flags)
+    options.disableflags = sum(off)
+    side.model.actuator_forcelimited[:] = 0
+    side.model.jnt_actfrclimited[:] = 0
+    options.gravity[:] = (0, 0, -GRAVITY)
+    options.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    options.timestep = time_step  # it limits how stiff constraints are
 
 
-def pair_models(source: Any, written: Any) -> tuple[list[str], tuple[Side, Side]]:
-    """Return the names of the joints of both models, and the two sides."""
+def joint_names_of(model: Any) -> list[str]:
+    """Return the names of the hinges and slides of a model that have one."""
     import mujoco
 
-    common = [n for n in _joint_names(written) if n and n in set(_joint_names(source))]
-    sides = []
-    for original in (source, written):
-        model = copy.copy(original)
-        joints = tuple(int(model.joint(name).id) for name in common)
-        (free,) = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-        place = {joint: k for k, joint in enumerate(joints)}
-        servos = {
-            place[int(model.actuator_trnid[k, 0])]: k
-            for k in range(model.nu)
-            if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT)
-            and model.actuator_trnid[k, 0] in place
-            and model.actuator_gainprm[k, 0] == -model.actuator_biasprm[k, 1] != 0
-        }
-        data = mujoco.MjData(model)
-        base = int(model.jnt_qposadr[free[0]]) if len(free) else -1
-        sides.append(Side(model=model, data=data, joints=joints, base=base, servos=servos))
-    return common, (sides[0], sides[1])
+    moving = np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE))
+    return [name for k in moving if (name := model.joint(k).name)]
+
+
+def make_side(original: Any, joint_names: Sequence[str]) -> Side:
+    """Return a copy of a model with the addresses of its joints and their position actuators.
+
+    Args:
+        original: The `mujoco.MjModel`.
+        joint_names: Names of hinges and slides of the model.
+    """
+    import mujoco
+
+    model = copy.copy(original)
+    joints = tuple(int(model.joint(name).id) for name in joint_names)
+    (free,) = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    place = {joint: k for k, joint in enumerate(joints)}
+    servos = {
+        place[int(model.actuator_trnid[k, 0])]: k
+        for k in range(model.nu)
+        if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT)
+        and model.actuator_trnid[k, 0] in place
+        and model.actuator_gainprm[k, 0] == -model.actuator_biasprm[k, 1] != 0
+    }
+    base = int(model.jnt_qposadr[free[0]]) if len(free) else -1
+    return Side(model=model, data=mujoco.MjData(model), joints=joints, base=base, servos=servos)
 
 
 def _limit_differences(joint_names: list[str], sides: tuple[Side, Side]) -> Iterator[str]:

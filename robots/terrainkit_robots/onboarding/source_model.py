@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description.model import Dynamics, Joint
 from terrainkit_robots.description.xml.document import RobotFileError, read_bytes
-from terrainkit_robots.onboarding.dynamics import Side, pair_models
+from terrainkit_robots.onboarding.dynamics import Side, joint_names_of, make_side
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.written_model import remove_drawings
 
@@ -54,8 +54,9 @@ def with_compiled_gains(facts: Facts) -> Facts:
         model = load_source(facts)
     except CannotCheckError:
         return facts  # the comparison says why
-    _, (side, _) = pair_models(model, model)
-    places = {model.joint(index).name: place for place, index in enumerate(side.joints)}
+    joint_names = joint_names_of(model)
+    side = make_side(model, joint_names)
+    places = {name: place for place, name in enumerate(joint_names)}
     joints = tuple(
         _compiled_joint(joint, side, places[joint.name]) if joint.name in places else joint
         for joint in facts.model.joints
