@@ -85,6 +85,9 @@ class Constraints:
         self.couplings: list[Coupling] = []
         self.loops: list[Loop] = []
         self.tendons: list[Tendon] = []
+        self.coupled: set[str] = set()
+        """Joints that other joints move through a loop or a fixed tendon."""
+
         self.left_out: list[str] = []
         """What is not read, one phrase each."""
 
@@ -160,6 +163,11 @@ class Constraints:
         if len(links) < 2 or WORLD in links or links[0] == links[1]:
             self.left_out.append(f"the constraint {name}, which closes no loop of the robot")
             return
+        chains = [_ancestors(body) for body, _ in ends]
+        if chains[0][-1] == chains[1][-1]:  # a mocap body closes no loop
+            for chain, other in (chains, chains[::-1]):
+                moved = [body for body in chain if body not in other]
+                self.coupled |= {joint.name for body in moved for joint in body.joints}
         self.loops.append(
             Loop(
                 name=name,
@@ -197,6 +205,7 @@ class Constraints:
         for wrap in tendon.path:
             if wrap.type == kinds.mjWRAP_JOINT and wrap.target is not None:
                 joints[wrap.target.name] = float(wrap.coef)
+                self.coupled.add(wrap.target.name)
             elif wrap.type == kinds.mjWRAP_PULLEY:
                 points.append(float(wrap.divisor))
             elif wrap.type == kinds.mjWRAP_SITE and wrap.target is not None:
@@ -219,3 +228,12 @@ def _reference(joint: Any) -> float:
 
     hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
     return float(joint.ref) * (math.pi / 180 if hinge and joint.compiler.degree else 1.0)
+
+
+def _ancestors(body: Any) -> list[Any]:
+    """Return a body and the bodies that carry it, without the world."""
+    found = []
+    while body is not None and body.parent is not None:
+        found.append(body)
+        body = body.parent
+    return found

@@ -16,7 +16,6 @@ import numpy as np
 
 from terrainkit_robots.description.mjcf.actuators import (
     ActuatorData,
-    coupled_joints,
     force_limit,
     position_gains,
     read_actuators,
@@ -114,7 +113,6 @@ class _SpecReader:
         self._joint_actuators: dict[str, list[ActuatorData]] = {}
         for actuator in self._actuators:
             self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
-        self._coupled = coupled_joints(spec)
         self._force_scales: dict[str, float] = {}
         new_body = mujoco.MjSpec().worldbody.add_body()
         self._new_joint, self._new_geom = new_body.add_joint(), new_body.add_geom()
@@ -146,8 +144,14 @@ class _SpecReader:
             self._compiled.world_pose,
             self._compiled.shape_pose,
         )
-        mimics = constraints.mimics
-        joints = [replace(joint, mimic=mimics.get(joint.name)) for joint in joints]
+        joints = [
+            replace(
+                joint,
+                mimic=constraints.mimics.get(joint.name),
+                coupled=joint.name in constraints.coupled,
+            )
+            for joint in joints
+        ]
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
         links = [replace(link, inertial=apply_minimums(link, *bounds)) for link in links]
@@ -396,7 +400,6 @@ class _SpecReader:
             anchor=frame[:3, 3],
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
-            coupled=joint.name in self._coupled,
             armature=armature * scale.armature,
             spring_reference=float(joint.springref) * unit,
             settings=settings_of(joint, self._new_joint, JOINT_SETTINGS),
