@@ -73,10 +73,19 @@ def _add_option(parser: argparse.ArgumentParser, command: str, option: Option) -
         action.completer = partial(_values, command, option)
 
 
-def _values(command: str, option: Option, prefix: str, **_: Any) -> list[str]:
+def _values(
+    command: str, option: Option, prefix: str, parsed_args: argparse.Namespace, **_: Any
+) -> list[str]:
     """Return the choices of an option, or the names and files that begin with a prefix."""
     from argcomplete.completers import FilesCompleter
 
+    if option.key == "set":
+        from terrainkit.terrain.parameter import parameters_of
+        from terrainkit.terrain.registry import get_terrain
+
+        given = prefix.rpartition(",")[0] + "," if "," in prefix else ""
+        terrain = (parsed_args.terrain or [""])[0]
+        return [f"{given}{name}=" for name in parameters_of(get_terrain(terrain))]
     hint = parse_hint(option.annotation)
     kind = parse_hint(hint.args[0]).kind if hint.origin is tuple else hint.kind
     if kind in (bool, int, float) or get_origin(kind) is Literal:
@@ -101,6 +110,7 @@ _NAMES: Mapping[str, tuple[str, str]] = {
     **dict.fromkeys(["suite", "suite name"], _SUITES),
     "overlay": ("terrainkit.terrain.registry", "overlay_names"),
     "preset": ("terrainkit.terrain.presets", "preset_names"),
+    "onboard config": ("terrainkit_robots.onboarding.frameworks.frameworks", "framework_names"),
     "code": ("terrainkit_robots.lint.rule", "rules"),
 }
 """Module and function with the names that an option accepts, by its key, with the command where

@@ -214,10 +214,14 @@ def read_args(options: Sequence[Option], argv: Sequence[str]) -> dict[str, Any]:
         number = len(rest) if option.nargs == "*" else 1
         given[option.key], rest = rest[:number], rest[number:]
     if rest:
-        raise UsageError(f"got {truncate(rest[0])}; expected no more arguments")
+        word = truncate(rest[0])
+        has_output = any(option.key == "output" for option in options) and "output" not in given
+        hint = f", or -o {word}" if has_output else ""
+        raise UsageError(f"got {word}; expected no more arguments{hint}")
     for option in options:
         if option.default is MISSING and option.key not in given:
-            raise UsageError(f"{option.name}: missing")
+            about = re.split(r"\.(?:\s|$)", option.help)[0]
+            raise UsageError(f"{option.name}: missing ({about[:1].lower()}{about[1:]})")
     try:
         used = (option for option in options if option.key in given)
         return {option.key: option.convert(given[option.key]) for option in used}

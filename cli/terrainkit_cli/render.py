@@ -23,6 +23,9 @@ _T = TypeVar("_T")
 _CONTROL = re.compile("[\\0-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u202a-\\u202e\\u2066-\\u2069]")
 """Control characters besides tab and newline, and marks of the writing direction."""
 
+_ARGUMENT = re.compile(r"`(\w+)=([^`]+)`")
+"""A Python argument in a message, such as `scale=0.01` or `origin=(0, 0, 0)`."""
+
 BAR_DELAY = 0.5
 """Time after which a progress bar appears [s]."""
 
@@ -96,8 +99,14 @@ def error(message: str) -> None:
 
 def _print_message(message: str) -> None:
     with suppress(OSError):  # such as from a closed terminal
-        text = _escape_control(_relative_paths(message))
+        text = _ARGUMENT.sub(_option, _escape_control(_relative_paths(message)))
         print(f"terrainkit: {text}", file=sys.stderr, flush=True)
+
+
+def _option(argument: re.Match[str]) -> str:
+    """Return the option of the command line for a Python argument: --scale 0.01."""
+    name, value = argument[1].replace("_", "-"), re.sub("[(),']", "", argument[2])
+    return {"True": f"--{name}", "False": f"--no-{name}"}.get(value, f"--{name} {value}")
 
 
 def _relative_paths(text: str) -> str:

@@ -16,6 +16,7 @@ from terrainkit_cli.argument_types import (
     OutputPath,
     Packages,
     XacroArguments,
+    is_map,
     parse_settings,
     split_commas,
 )
@@ -117,6 +118,8 @@ class CheckRobot(Command):
         """Check each file and print the reports."""
         if not self.files:
             raise ConfigError("FILE: missing; expected robot files, quadruped, or biped")
+        for name in filter(is_map, self.files):
+            raise ConfigError(f"{name} is a map; terrainkit check-map {name} checks it")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         settings = self._settings()

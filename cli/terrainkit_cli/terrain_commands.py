@@ -313,8 +313,8 @@ class Preview(PluginCommand):
     map: MapFile
     """The map, a file written by terrainkit generate."""
 
-    output: OutputPath
-    """The image to write (.png)."""
+    output: OutputPath | None = None
+    """The image to write (.png); by default, the name of the map with this suffix."""
 
     width: int = 1600
     """Width of the map in the image [pixels]; a tall map is narrower, and a long one is divided."""
@@ -327,8 +327,9 @@ class Preview(PluginCommand):
         from terrainkit.views.preview import write_preview
 
         terrain_map = TerrainMap.load(self.map)
-        write_preview(terrain_map, self.output, width=self.width, overwrite=self.overwrite)
-        render.result(written(terrain_map, self.output))
+        output = self.output or self.map.with_suffix(".png")
+        write_preview(terrain_map, output, width=self.width, overwrite=self.overwrite)
+        render.result(written(terrain_map, output))
         return 0
 
 

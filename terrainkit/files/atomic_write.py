@@ -94,7 +94,7 @@ def check_target(path: Path, *, overwrite: bool) -> None:
         if path.exists() and not path.is_file():
             raise ExportError(f"cannot write {path}: it exists and is not a regular file")
         if path.exists() and not overwrite:
-            raise ExportError(f"{path} exists; use another name, or --overwrite")
+            raise ExportError(f"{path} exists; use another name, or `overwrite=True`")
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
     check_parents(path)

@@ -5,8 +5,9 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,15 +44,21 @@ _MAX_TASKS = 64
 
 
 def generate(
-    config: MapConfig, *, progress: Progress | None = None, executor: "Executor | None" = None
+    config: MapConfig | None = None,
+    *,
+    progress: Progress | None = None,
+    executor: "Executor | None" = None,
+    **values: Any,
 ) -> TerrainMap:
     """Generate the map of `config`.
 
     Args:
-        config: The configuration. The same config gives the same bytes on every machine.
+        config: The configuration; None for the defaults. The same config gives the same bytes on
+            every machine.
         progress: Wraps the iterator over the patches, for a progress bar.
         executor: Builds the patches, such as a `ProcessPoolExecutor` or dask.distributed's
             `Client.get_executor()`; None for this process. The map does not depend on it.
+        **values: Values that replace those of `config`, such as `rows=5`.
 
     Returns:
         The map.
@@ -62,10 +69,12 @@ def generate(
             the terrain places it, or if patches meet at a cliff.
 
     Raises:
-        ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
+        ConfigError: if a value is invalid, or a terrain does not fit in a patch or has no place to
+            spawn.
         MemoryLimitError: if the map would not fit in memory; nothing was allocated.
         TerrainkitError: if the executor fails, for example because its processes end.
     """
+    config = replace(config or MapConfig(), **values)
     grid = config.grid
     samples = grid.shape[0] * grid.shape[1]
     check_memory(

@@ -302,8 +302,8 @@ class MapConfig(Config):
             raise ConfigError(f"terrains: got {count} of name {name!r}; expected unique names")
         if self.mode == "selected" and len(names) != 1:
             raise ConfigError(
-                f"mode selected: got {len(names)} terrains ({listing(names)}); expected one "
-                "(--terrain)"
+                f"mode selected: got {len(names)} terrains ({listing(names)}); expected one, such "
+                "as stairs"
             )
         if not sum(terrain.proportion for terrain in self.sub_terrains) > 0:
             raise ConfigError(

@@ -43,7 +43,7 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
     if not contents:
         return
     if not overwrite:
-        raise ExportError(f"{target} exists; use another name, or --overwrite")
+        raise ExportError(f"{target} exists; use another name, or `overwrite=True`")
     if SPEC_FILE not in contents:
         raise ExportError(
             f"{target} contains no {SPEC_FILE}; only folders of onboarded robots are overwritten"

@@ -21,6 +21,7 @@ from types import ModuleType
 from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
+from terrainkit_robots.description.robot_file import robot_names
 from terrainkit_robots.rl.config import Observations, Task
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -134,6 +135,12 @@ def get_task(name_or_folder: str | Path) -> RegisteredTask:
         return _registered[name]
     if not isdir(name):  # noqa: PTH112 - Path.is_dir raises OSError for long names
         expected = expected_names(name, task_names(), "tasks are")
+        if folder.suffix.lower() == ".npz":
+            expected = f"a map is a terrain: `terrain={name}`; {expected}"
+        for file in (name, f"{name}_description"):
+            if file in robot_names() or folder.suffix in (".urdf", ".xacro", ".xml"):
+                expected = f"terrainkit onboard {file} makes a folder; {expected}"
+                break
         raise ConfigError(f"no task or robot folder {truncate(repr(name))}; {expected}")
     if not (folder / SPEC_FILE).exists():
         raise ConfigError(f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard")

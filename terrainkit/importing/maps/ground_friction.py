@@ -39,7 +39,7 @@ def read_friction(
     """
     if not options.friction:
         if options.friction_range or options.friction_classes:
-            raise ConfigError("friction: missing; --friction friction.png is the image")
+            raise ConfigError("friction: missing; `friction=friction.png` is the image")
         return None
     path = Path(options.friction)
     check_file(path)
@@ -61,8 +61,8 @@ def _coefficients(path: Path, values: NDArray[Any], options: ImportOptions) -> N
         raise HeightFileError(f"{path}: got {values.dtype} values; expected 8 or 16 bits, unsigned")
     if (options.friction_range is None) == (options.friction_classes == ""):
         raise ConfigError(
-            f"friction_range: got {path}; expected either --friction-range 0 1 (coefficients of "
-            "black and white) or --friction-classes FILE (a TOML file with lines such as 255 = 0.8)"
+            f"friction_range: got {path}; expected either `friction_range=(0, 1)` (coefficients of "
+            "black and white) or `friction_classes=FILE` (a TOML file with lines such as 255 = 0.8)"
         )
     if options.friction_range:
         levels = np.linspace(*options.friction_range, np.iinfo(values.dtype).max + 1)

@@ -76,7 +76,7 @@ def place_spawns(
     text = (
         f"{who}no free disk of radius {config.spawn_radius:g} m is flat within "
         f"{config.spawn_tolerance:g} m; the heights in the flattest one differ by up to "
-        f"{tolerance:g} m, {where}which --spawn-tolerance {tolerance:g} accepts"
+        f"{tolerance:g} m, {where}which `spawn_tolerance={tolerance:g}` accepts"
     )
     if not relax:
         raise ConfigError(text)

@@ -39,8 +39,8 @@ def check_length(path: Path, source: Source, cell: float) -> None:
     text, side = _size(path, source)
     if side < MIN_CELLS * cell - 1e-9:
         raise HeightFileError(
-            f"{text}; expected at least {MIN_CELLS} cells of {cell:g} m: a smaller --cell, such as "
-            f"{0.9 * side / MIN_CELLS:.2g}, or --scale if its unit is larger than a meter"
+            f"{text}; expected at least {MIN_CELLS} cells of {cell:g} m: a smaller cell, such as "
+            f"`cell={0.9 * side / MIN_CELLS:.2g}`, or a scale if its unit is larger than a meter"
         )
 
 
@@ -61,27 +61,27 @@ def check_samples(path: Path, source: Source, cell: float, samples: int) -> None
         MemoryLimitError: if the samples would not fit in memory.
     """
     text, side = _size(path, source)
-    doubt = f"{text}: in millimeters? --scale 0.001 (0.01 for centimeters, 1 for meters)"
+    doubt = f"{text}: in millimeters? `scale=0.001` (0.01 for centimeters, 1 for meters)"
     if not source.is_metric and samples > MAX_SAMPLES:
         larger = 1.05 * cell * math.sqrt(samples / MAX_SAMPLES)
         raise HeightFileError(
             f"{doubt}; {samples} samples of {cell:g} m; expected at most {MAX_SAMPLES}: "
-            f"--cell {larger:.2g}, or --patch-size for a part"
+            f"`cell={larger:.2g}`, or `patch_size=(50, 50)` for a part"
         )
     if not source.is_metric and side > LARGE:
         warn(doubt)
     elif min(side, cell * math.sqrt(samples)) > MAX_SIDE:  # a part of the file may be smaller
         x, y = (np.add(source.lower, source.upper) / 2 - 25).round(1).tolist()
         warn(
-            f"{text}, with cells of {cell:.4g} m; --cell 1 --origin {x:.10g} {y:.10g} 0 "
-            "--patch-size 50 50 --rows 1 --cols 1 takes a part for a robot"
+            f"{text}, with cells of {cell:.4g} m; `cell=1` `origin=({x:.10g}, {y:.10g}, 0)` "
+            "`patch_size=(50, 50)` `rows=1` `cols=1` takes a part for a robot"
         )
     check_memory(
         samples * _BYTES_PER_SAMPLE,
         f"a map of {samples} samples",
         hint=lambda share: (
-            f"; --cell {1.05 * cell / share**0.5:.2g} would fit, or a part of the file by "
-            "--origin, --patch-size, --rows and --cols"
+            f"; `cell={1.05 * cell / share**0.5:.2g}` would fit, or a part of the file by "
+            "origin, patch_size, rows and cols"
         ),
     )
 

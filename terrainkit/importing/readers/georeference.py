@@ -79,7 +79,7 @@ class Georeference:
         if not all(MIN_SIZE <= side <= MAX_VALUE for side in (dx, dy)):
             raise HeightFileError(
                 f"{path}: got cells of {text}; expected {MIN_SIZE:g} m to {MAX_VALUE:,} m, which "
-                "--file-cell can state"
+                "file_cell can state"
             )
         is_turned = xy != 0 or yx != 0 or xx < 0
         is_moved = is_turned or self.unit is None or self.is_web_mercator

@@ -245,17 +245,21 @@ def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Arra
         f"{path}: {count} of {heights.size} heights are missing, the first at ({x[i]:g}, {y[j]:g})"
     )
     if missing == "reject" or count == heights.size:
-        hint = "" if count == heights.size else "; --missing nearest or lowest fills them"
+        hint = (
+            ""
+            if count == heights.size
+            else "; `missing='nearest'` or `missing='lowest'` fills them"
+        )
         raise HeightFileError(found + hint)
     if count > _MAX_MISSING * heights.size and missing == "nearest":
         raise HeightFileError(
-            f"{found}; expected at most {_MAX_MISSING:.0%}; --missing lowest fills them, and --up "
-            "turns a mesh that is on its side"
+            f"{found}; expected at most {_MAX_MISSING:.0%}; `missing='lowest'` fills them, and "
+            "`up='y'` or `up='z'` turns a mesh that is on its side"
         )
     if missing == "lowest":
         return np.where(is_missing, np.nanmin(heights), heights)
     from scipy.ndimage import distance_transform_edt
 
-    warn(f"{found}; they become the nearest heights, --missing reject makes this an error")
+    warn(f"{found}; they become the nearest heights, `missing='reject'` makes this an error")
     nearest = distance_transform_edt(is_missing, return_distances=False, return_indices=True)
     return np.asarray(heights[tuple(nearest)])

@@ -147,7 +147,7 @@ def _warn_about_up(path: Path, source: MeshSource, up: str) -> None:
     if is_likely:
         warn(
             f"{path} is {height:.4g} m high and {length:.4g} m wide, and most of its area is "
-            f"vertical: lying on its side? --up {'z' if up == 'y' else 'y'}"
+            f"vertical: lying on its side? `up='{'z' if up == 'y' else 'y'}'`"
         )
 
 

@@ -34,7 +34,7 @@ def _read_array(path: Path, key: str) -> dict[str, Any]:
     keys = [name for name in grids if name == key or not key]
     if len(keys) != 1:
         raise ValueError(
-            f"got key {key!r} and the grids {', '.join(grids) or 'none'}; --key "
-            f"{(grids or ['NAME'])[0]} selects one"
+            f"got key {key!r} and the grids {', '.join(grids) or 'none'}; "
+            f"`key={(grids or ['NAME'])[0]}` selects one"
         )
     return {"values": arrays[keys[0]]}

@@ -50,10 +50,10 @@ def gray(path: Path, pixels: NDArray[Any], band: int | None) -> NDArray[Any]:
     bands = pixels.reshape(*pixels.shape[:2], -1)
     count = bands.shape[2]
     if band and band > count:
-        raise ConfigError(f"band: got {band}; {path} has {count}, --band 1 is the first")
+        raise ConfigError(f"band: got {band}; {path} has {count}, `band=1` is the first")
     if not band and count > 1 and (bands != bands[..., :1]).any():
         raise HeightFileError(
-            f"{path}: got {count} different colors or bands; expected a gray image; --band 1 takes "
+            f"{path}: got {count} different colors or bands; expected a gray image; `band=1` takes "
             "the heights from the first (red)"
         )
     return bands[..., (band or 1) - 1]

@@ -103,7 +103,7 @@ def read(path: Path, options: ReadOptions) -> Source:
     points = arrays["points"]
     if "classes" in arrays:
         if arrays["is_feet"] and not options.scale:
-            warn(f"{path}: states feet, which are taken as meters; --scale 0.3048 converts them")
+            warn(f"{path}: states feet, which are taken as meters; `scale=0.3048` converts them")
         points = points[_is_ground(path, arrays["classes"], options)]
     return make_point_source(path, points, options)
 
@@ -113,13 +113,13 @@ def _is_ground(path: Path, classes: NDArray[Any], options: ReadOptions) -> NDArr
     used = np.unique(classes)
     wanted = options.point_class or ((GROUND_CLASS,) if GROUND_CLASS in used else used.tolist())
     is_ground = np.isin(classes, wanted)
-    known = " ".join(map(str, used.tolist()))
+    known = ", ".join(map(str, used.tolist()))
     if not is_ground.any():
         raise ConfigError(f"class: got {wanted}; {path} has the classes {known}")
     if not options.point_class and not is_ground.all():
         warn(
             f"{path}: only the {int(is_ground.sum())} of {len(classes)} points of class "
-            f"{GROUND_CLASS} (ground) are taken; --class {known} takes all"
+            f"{GROUND_CLASS} (ground) are taken; `point_class=({known})` takes all"
         )
     return is_ground
 

@@ -21,8 +21,8 @@ _BYTES_PER_VALUE = 40
 """Peak memory of a height of a file [bytes]."""
 
 _HEIGHT_OPTIONS = {
-    "u": "--height-range 0 2 (0 m to 2 m) or --scale 1 (meters)",
-    "i": "--scale 0.01 (centimeters)",
+    "u": "`height_range=(0, 2)` (0 m to 2 m) or `scale=1` (meters)",
+    "i": "`scale=0.01` (centimeters)",
 }
 
 _FULL_RANGE = 0.75
@@ -188,7 +188,7 @@ def make_raster(
     if spacing is None or scale is None:
         needed = []
         if spacing is None:
-            needed.append("--file-cell 0.1 (0.1 m between samples)")
+            needed.append("`file_cell=0.1` (0.1 m between samples)")
         if scale is None:
             needed.append(_HEIGHT_OPTIONS.get(kind, ""))
         raise ConfigError(
@@ -208,11 +208,11 @@ def make_raster(
     sides = [n * length for n, length in zip(values.shape, spacing, strict=True)]
     known = heights[~np.isnan(heights)]
     if known.size and np.ptp(known) > _MAX_RELIEF * max(sides):
-        file_cell = " ".join(f"{111_000 * step:.6g}" for step in spacing)
+        file_cell = ", ".join(f"{111_000 * step:.6g}" for step in spacing)
         warn(
             f"{path}: got {sides[0]:.6g} m x {sides[1]:.6g} m with heights over "
-            f"{np.ptp(known):.4g} m; are they in centimeters (--scale 0.01), or positions in "
-            f"degrees (--file-cell {file_cell} is in meters)?"
+            f"{np.ptp(known):.4g} m; are they in centimeters (`scale=0.01`), or positions in "
+            f"degrees (`file_cell=({file_cell})` is in meters)?"
         )
     if values.dtype.itemsize == 1:
         warn(f"{path}: 8 bits have terraces: heights in steps of {abs(scale):.3g} m; use 16 bits")
@@ -226,12 +226,12 @@ def _warn_of_range(path: Path, values: Array, most: int, low: float, high: float
     if not bottom < top or (bottom == 0 and top >= _FULL_RANGE * most):
         return
     step, largest = (high - low) / (top - bottom), low + (high - low) * most / top
-    text = f"--height-range {low - step * bottom:.6g} {low + step * (most - bottom):.6g}"
+    text = f"`height_range=({low - step * bottom:.6g}, {low + step * (most - bottom):.6g})`"
     if bottom > 0 and top < most:
-        text += f"; in Gazebo, only the largest one has: --height-range {low:g} {largest:.6g}"
+        text += f"; in Gazebo, only the largest one has: `height_range=({low:g}, {largest:.6g})`"
     simulators = "MuJoCo" if bottom > 0 else "MuJoCo and Gazebo"
     warn(
-        f"{path}: got values from {bottom:g} to {top:g}; --height-range is for 0 and {most}. In "
+        f"{path}: got values from {bottom:g} to {top:g}; height_range is for 0 and {most}. In "
         f"{simulators}, the smallest and the largest value of the image have these heights: {text}"
     )
 
@@ -269,6 +269,6 @@ def _known_values(
         known[known == marker] = np.nan
         warn(
             f"{path}: {count} of {values.size} values are {marker:g}, far from all others: they "
-            "are taken as missing heights (--no-detect-nodata keeps them)"
+            "are taken as missing heights (`detect_nodata=False` keeps them)"
         )
     return known

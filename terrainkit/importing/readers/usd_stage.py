@@ -103,7 +103,7 @@ def _read_stage(path: Path, up: str, scale: float | None) -> dict[str, Any]:
             left_out["visible shapes that do not collide"].append(shape.prim.GetPath())
     notes = [f"{kind} are left out: {listing(map(str, paths))}" for kind, paths in left_out.items()]
     if not has_unit and not scale:
-        notes.append("states no metersPerUnit: taken as meters; --scale 0.01 for centimeters")
+        notes.append("states no metersPerUnit: taken as meters; `scale=0.01` for centimeters")
     stated = {"unit": 1.0} if has_unit or scale else {}
     return {**scene.arrays(), "notes": np.array(notes, str), **stated}
 

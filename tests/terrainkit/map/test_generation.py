@@ -36,6 +36,12 @@ def test_generate_default_map_has_golden_bytes():
     assert digest == "1454113576474cb6fc191cdb81c8c11159fb6d4c13560015f863ec9b0277be95"
 
 
+def test_generate_takes_values_in_place_of_those_of_a_config():
+    config = MapConfig(rows=2, terrains=(SubTerrain(terrain="stairs"),))
+    assert generate(config, cols=1).config == replace(config, cols=1)
+    assert generate(rows=1, cols=1, terrains=config.terrains).config.rows == 1
+
+
 def test_generate_puts_every_patch_at_its_place():
     terrain_map = generate(SMALL)
     # 3 x 80 and 4 x 60 cells, and 10 of border on each side.

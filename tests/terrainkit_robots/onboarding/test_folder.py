@@ -52,7 +52,7 @@ def test_new_folder_removes_folders_of_killed_processes(tmp_path):
 
 def test_new_folder_requires_overwrite(tmp_path, robot):
     (robot / "robot.toml").write_text("mine")
-    with pytest.raises(ExportError, match="exists; use another name, or --overwrite"):
+    with pytest.raises(ExportError, match="exists; use another name, or `overwrite=True`"):
         make(robot)
     assert contents(tmp_path) == NEW | {"robot/robot.toml": b"mine"}
     make(robot, overwrite=True)

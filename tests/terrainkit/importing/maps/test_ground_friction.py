@@ -56,7 +56,7 @@ def test_friction_classes(make):
 @pytest.mark.parametrize(
     ("pixels", "options", "error", "message"),
     [
-        (PIXELS, {}, ConfigError, "expected either --friction-range 0 1 .* or --friction-classes"),
+        (PIXELS, {}, ConfigError, "expected either `friction_range=.* or `friction_classes"),
         (PIXELS, {"classes": "0 = 1", "friction_range": RANGE}, ConfigError, "expected either"),
         (PIXELS, {"classes": "0 = 1\n51 = 2"}, ConfigError, "0, 51; .* values 102, 153, 204, 255"),
         (PIXELS, {"classes": "0 = -1"}, ConfigError, r"c\.toml.*expected"),

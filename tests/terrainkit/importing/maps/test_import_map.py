@@ -159,7 +159,7 @@ def test_import_fills_missing_heights(tmp_path, missing, expected):
     heights = steps()
     heights[0, 0] = -0.5
     heights[35, 12:14] = np.nan
-    message = r"2 of 2400 heights are missing, the first at \(3\.55, 1\.25\).* --missing reject"
+    message = r"2 of 2400 heights are missing, the first at \(3\.55, 1\.25\).* `missing='reject'"
     is_default = missing == "nearest"
     with pytest.warns(tk.TerrainkitWarning, match=message) if is_default else nullcontext():
         imported = import_array(tmp_path, heights, **({} if is_default else {"missing": missing}))
@@ -172,7 +172,7 @@ def test_import_of_too_many_samples_names_a_cell_that_fits(tmp_path, monkeypatch
     monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 100_000)
     monkeypatch.setattr(memory, "free_memory", lambda: 120_000)
     # 2400 samples of 200 bytes are 4 times as much as is free: cells of 0.2 m, and some more.
-    with pytest.raises(MemoryLimitError, match=r"map of 2400 samples .*; --cell 0\.21 would fit"):
+    with pytest.raises(MemoryLimitError, match=r"map of 2400 samples .*; `cell=0\.21` would fit"):
         import_array(tmp_path, steps())
     assert import_array(tmp_path, steps(), cell=0.21).terrain_map.grid.shape == (28, 19)
 
@@ -200,7 +200,7 @@ def test_import_without_flat_disk_starts_on_the_flattest(tmp_path):
         terrain_map = import_array(tmp_path, rough_but_for_one_patch(), **options).terrain_map
     assert len(caught) == 1
     tolerance = terrain_map.config.spawn_tolerance
-    assert f"--spawn-tolerance {tolerance:g} accepts" in str(caught[0].message)
+    assert f"`spawn_tolerance={tolerance:g}` accepts" in str(caught[0].message)
     assert 0.04 < tolerance <= 0.05
     assert validate(terrain_map) == []
     assert terrain_map.env_origins[0, 0].tolist() == [1.5, 1.0, 0.0]  # flat, so at the center
@@ -210,7 +210,7 @@ def test_import_without_flat_disk_starts_on_the_flattest(tmp_path):
     heights = rough_but_for_one_patch()
     given = import_array(tmp_path, heights, **options, spawn_tolerance=tolerance).terrain_map
     assert validate(given) == []
-    with pytest.raises(ConfigError, match=r"3 of 4 patches: .* 0\.02 m; .*--spawn-tolerance 0\.0"):
+    with pytest.raises(ConfigError, match=r"3 of 4 patches: .* 0\.02 m; .*`spawn_tolerance=0\.0"):
         import_array(tmp_path, heights, **options, spawn_tolerance=0.02)
 
 
@@ -412,7 +412,9 @@ def test_import_proposes_a_part_at_the_center(tmp_path):
     with pytest.warns(tk.TerrainkitWarning) as found:
         import_map(tmp_path / "a.asc")
     text = next(str(each.message) for each in found if "a part for a robot" in str(each.message))
-    x, y, *size = re.search(r"--origin (\S+) (\S+) 0 --patch-size (\S+) (\S+) ", text).groups()
+    x, y, *size = re.search(
+        r"origin=\((.+), (.+), 0\)` `patch_size=\((.+), (.+)\)` ", text
+    ).groups()
     origin, size = (float(x), float(y), 0.0), (float(size[0]), float(size[1]))
     part = ImportOptions(cell=1.0, origin=origin, patch_size=size, rows=1, cols=1)
     report = import_map(tmp_path / "a.asc", part).report

@@ -21,7 +21,7 @@ def source(x, y, *, is_metric=False):
     [
         ((1.0, 0.5), None),
         ((0.999, 0.5), r"^a\.stl is 0\.999 m x 0\.5 m; expected at least 10 cells of 0\.1 m"),
-        ((0.05, 0.03), r"smaller --cell, such as 0\.0045, or --scale if its unit is larger"),
+        ((0.05, 0.03), r"smaller cell, such as `cell=0\.0045`, or a scale if its unit is larger"),
         ((0.0, 0.0), "is 0 m x 0 m; expected at least 10 cells"),
     ],
 )
@@ -30,7 +30,7 @@ def test_length_is_at_least_ten_cells(size, message):
         check_length(Path("a.stl"), source(*size), 0.1)
 
 
-DOUBT = r"^a\.stl is {} m: in millimeters\? --scale 0\.001 .*"
+DOUBT = r"^a\.stl is {} m: in millimeters\? `scale=0\.001` .*"
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ DOUBT = r"^a\.stl is {} m: in millimeters\? --scale 0\.001 .*"
             39_800_000,
             False,
             HeightFileError,
-            DOUBT.format("1990 m x 200") + r"; 39800000 samples of 0\.1 m; .*: --cell 0\.32,",
+            DOUBT.format("1990 m x 200") + r"; 39800000 samples of 0\.1 m; .*: `cell=0\.32`,",
         ),
     ],
 )

@@ -53,7 +53,7 @@ BANDS = np.arange(2 * 40 * 30, dtype=np.float32).reshape(2, 40, 30) / 7
 def test_gdal_reads_bands_of_all_tiffs(tmp_path, profile):
     pytest.importorskip("rasterio")
     path = write(tmp_path / "a.tif", BANDS, **profile)
-    with pytest.raises(HeightFileError, match=r"2 different colors or bands; .*--band 1"):
+    with pytest.raises(HeightFileError, match=r"2 different colors or bands; .*band=1"):
         open_source(path, ReadOptions(file_cell=1.0))
     found = open_source(path, ReadOptions(file_cell=1.0, band=2))
     np.testing.assert_array_equal(found.values, BANDS[1, ::-1].T)

@@ -59,6 +59,6 @@ def test_fill_missing_refuses_what_is_mostly_missing():
     heights = np.full((10, 10), np.nan)
     heights[0, :9] = 1.0  # 91 of 100 are missing
     places = np.arange(10.0)
-    with pytest.raises(HeightFileError, match=r"91 of 100 .* expected at most 90%; --missing low"):
+    with pytest.raises(HeightFileError, match=r"91 of 100 .* expected at most 90%; `missing='low"):
         fill_missing(Path("a.stl"), heights, "nearest", places, places)
     assert (fill_missing(Path("a.stl"), heights, "lowest", places, places) == 1).all()

@@ -76,7 +76,7 @@ def test_image_of_equal_colors_is_gray(tmp_path, opacity):
 def test_image_of_other_colors_needs_a_band(tmp_path):
     path = write(tmp_path / "a.png", tinted(0, 2000, 0))
     options = {"file_cell": 9.0, "scale": 1e-3}
-    with pytest.raises(HeightFileError, match=r"got 3 different colors .*--band 1"):
+    with pytest.raises(HeightFileError, match=r"got 3 different colors .*band=1"):
         read(path, ReadOptions(**options))
     green = read(path, ReadOptions(**options, band=2))
     assert green.values[0, 3] == pytest.approx(2.0)
@@ -87,10 +87,10 @@ def test_image_of_other_colors_needs_a_band(tmp_path):
 @pytest.mark.parametrize(
     ("dtype", "options", "message"),
     [
-        (np.uint16, {}, r"got uint16 values .*--file-cell 0\.1 .* --height-range 0 2 "),
-        (np.uint16, {"file_cell": 1.0}, "got uint16 values.*example --height-range 0 2"),
-        (np.uint16, {"scale": 1.0}, "got uint16 values.*example --file-cell 0.1 [^-]*$"),
-        (np.float32, {}, r"got float32 values.*example --file-cell 0\.1 \(.*\), or"),
+        (np.uint16, {}, r"got uint16 values .*file_cell=0\.1` .* `height_range=\(0, 2\)` "),
+        (np.uint16, {"file_cell": 1.0}, "got uint16 values.*example `height_range=\\(0, 2\\)"),
+        (np.uint16, {"scale": 1.0}, "got uint16 values.*example `file_cell=0.1`[^=]*$"),
+        (np.float32, {}, r"got float32 values.*example `file_cell=0\.1` \(.*\), or"),
         (np.float32, RANGE, "^height_range: got float32 values"),
     ],
 )

@@ -208,7 +208,7 @@ def test_bodies_that_touch_up_to_rounding_have_no_gap(decoded):
 def test_mesh_that_lies_on_its_side_is_warned_of(tmp_path, size, is_warned, suffix, other):
     size = size if suffix == "stl" else [size[0], size[2], size[1]]
     box(size, (0, 0, 0)).export(tmp_path / f"a.{suffix}")
-    message = rf"10 m high and 1 m wide.*--up {other}$"
+    message = rf"10 m high and 1 m wide.*`up='{other}'`$"
     with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
         read(tmp_path / f"a.{suffix}", ReadOptions())
 
@@ -217,6 +217,6 @@ def test_mesh_that_lies_on_its_side_is_warned_of(tmp_path, size, is_warned, suff
 def test_obj_with_more_area_to_one_side_is_warned_of(tmp_path, height, is_warned):
     # The side of 9 x 6.6 faces y; the top has an area of 9 x 5, and 1.3 times this is 9 x 6.5.
     box((9, 5, height), (0, 0, 0)).export(tmp_path / "a.obj")
-    message = "lying on its side.*--up y$"
+    message = "lying on its side.*`up='y'`$"
     with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
         read(tmp_path / "a.obj", ReadOptions())

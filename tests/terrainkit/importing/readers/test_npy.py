@@ -55,11 +55,11 @@ def test_npz_with_one_grid_or_a_key(tmp_path):
     assert read(path, METER).values.tolist() == grid.tolist()
     np.savez(path, a=grid, b=2 * grid)
     with pytest.raises(
-        HeightFileError, match=r"got key '' and the grids a, b; --key a selects one"
+        HeightFileError, match=r"got key '' and the grids a, b; `key=a` selects one"
     ):
         read(path, METER)
     assert read(path, ReadOptions(file_cell=1.0, key="b")).values[1, 2] == 10
-    with pytest.raises(HeightFileError, match=r"got key 'c' and the grids a, b; --key a selects"):
+    with pytest.raises(HeightFileError, match=r"got key 'c' and the grids a, b; `key=a` selects"):
         read(path, ReadOptions(file_cell=1.0, key="c"))
     path.write_bytes(b"PK")
     with pytest.raises(HeightFileError, match=r"a\.npz: cannot be read"):

@@ -123,7 +123,9 @@ def save_las(path, classes, records=()):
 def test_las_has_the_points_of_its_ground(tmp_path, classes, wanted, expected):
     path = save_las(tmp_path / "a.las", classes)
     is_cut = wanted is None and len(expected) < len(classes)
-    message = r"the 2 of 4 points of class 2 \(ground\) are taken; --class 2 5 6 takes all"
+    message = (
+        r"the 2 of 4 points of class 2 \(ground\) are taken; `point_class=\(2, 5, 6\)` takes all"
+    )
     with pytest.warns(TerrainkitWarning, match=message) if is_cut else nullcontext():
         source = read(path, ReadOptions(point_class=wanted))
     assert source.vertices[:, 2].tolist() == expected
@@ -131,7 +133,7 @@ def test_las_has_the_points_of_its_ground(tmp_path, classes, wanted, expected):
 
 def test_las_without_the_class_is_rejected(tmp_path):
     path = save_las(tmp_path / "a.las", [2, 5])
-    with pytest.raises(ConfigError, match=r"class: got \(9,\); .*a\.las has the classes 2 5$"):
+    with pytest.raises(ConfigError, match=r"class: got \(9,\); .*a\.las has the classes 2, 5$"):
         read(path, ReadOptions(point_class=(9,)))
 
 
@@ -149,7 +151,7 @@ def test_las_in_feet_is_warned_of(tmp_path, number, data, is_feet):
     laspy = pytest.importorskip("laspy")
     record = laspy.VLR("LASF_Projection", number, record_data=data)
     path = save_las(tmp_path / "a.las", [2, 2, 2], [record])
-    message = "states feet, which are taken as meters; --scale 0.3048 converts them$"
+    message = "states feet, which are taken as meters; `scale=0.3048` converts them$"
     with pytest.warns(TerrainkitWarning, match=message) if is_feet else nullcontext():
         assert read(path, ReadOptions()).upper == (2.0, 4.0)
     assert read(path, ReadOptions(scale=0.5)).upper == (1.0, 2.0)

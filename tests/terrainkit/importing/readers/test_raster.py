@@ -51,7 +51,7 @@ def test_values_of_nodata_are_missing_in_their_unit():
 def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
     values = np.linspace(0, relief, 50).reshape(10, 5)
     message = (
-        r"got 10 m x 5 m with heights over 101 m; .*--scale 0\.01.*--file-cell 111000 111000 is"
+        r"got 10 m x 5 m with heights over 101 m; .*scale=0\.01.*file_cell=\(111000, 111000\)` is"
     )
     with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
         make_raster(Path("a.npy"), values, ReadOptions(file_cell=1.0))
@@ -60,8 +60,8 @@ def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
 @pytest.mark.parametrize(
     ("bottom", "top", "expected"),
     [
-        (0, 127, "In MuJoCo and Gazebo, .* --height-range 1 5.01575$"),
-        (0, 191, "In MuJoCo and Gazebo, .* --height-range 1 3.67016$"),
+        (0, 127, "In MuJoCo and Gazebo, .* `height_range=\\(1, 5.01575\\)`$"),
+        (0, 191, "In MuJoCo and Gazebo, .* `height_range=\\(1, 3.67016\\)`$"),
         (0, 192, ""),
         (0, 0, ""),
         (7, 7, ""),
@@ -69,9 +69,9 @@ def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
         (
             128,
             168,
-            r"MuJoCo, .* --height-range -5.4 7.35; in Gazebo, .* --height-range 1 4.03571$",
+            r"MuJoCo, .* `height_range=\(-5.4, 7.35\)`; in Gazebo, .*=\(1, 4.03571\)`$",
         ),
-        (128, 255, r"In MuJoCo, .* --height-range -1.01575 3$"),
+        (128, 255, r"In MuJoCo, .* `height_range=\(-1.01575, 3\)`$"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:.*8 bits have terraces")

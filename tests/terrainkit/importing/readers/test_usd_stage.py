@@ -57,7 +57,7 @@ def test_stage_has_its_unit_and_axis(tmp_path, header, options, upper):
 
 def test_stage_without_unit_is_in_meters(tmp_path):
     path = save(tmp_path, "(upAxis = 'Z')" + TRIANGLE)
-    with pytest.warns(TerrainkitWarning, match=r"no metersPerUnit: taken as meters; --scale 0\.01"):
+    with pytest.warns(TerrainkitWarning, match=r"no metersPerUnit: taken as meters; `scale=0\.01`"):
         source = open_source(path, ReadOptions())
     assert (source.upper, source.is_metric) == ((300, 400), False)
 
