@@ -24,6 +24,7 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 import yaml
+from config_schema import config_schema
 from gallery import render_map, render_patches
 from numpy.typing import NDArray
 from rich.console import Console
@@ -251,6 +252,9 @@ CONFIGS = {
 }
 """Config class of each TOML file."""
 
+SCHEMAS = {"map": MapConfig, "robot": RobotSpec, "task": Task}
+"""Config class of each JSON schema."""
+
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
 
 
@@ -281,6 +285,9 @@ def config_page() -> str:
         NOTE,
         "The keys of each TOML file. An unknown key or an invalid value is an error that names it.",
         'The string "none" stands for no value.',
+        "Editors that know Taplo complete the keys from a JSON schema, which the first line of the",
+        "file names: `#:schema PATH/docs/schemas/task.json`, or [map.json](schemas/map.json),",
+        "[robot.json](schemas/robot.json), [task.json](schemas/task.json).",
         "[Names of legged_gym](legged_gym_names.md) compares the settings of a training.\n",
     ]
     for title, config in CONFIGS.items():
@@ -584,6 +591,7 @@ def main() -> int:
         "cli.md": cli_page(),
         "examples.md": examples_page(),
         "llms.txt": llms_text(),
+        **{f"schemas/{name}.json": config_schema(kind) for name, kind in SCHEMAS.items()},
         **api_pages(),
     }
     missing = [name for name in known if not any(PICTURES.glob(f"{name}.*"))]
