@@ -18,7 +18,7 @@ from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
 from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
 from terrainkit_robots.lint.rule import SEVERITIES, Finding
-from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.onboarding.comparison import NUM_STATES, error_text
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess
@@ -88,9 +88,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
     if robot is None or checks is None:
         return
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
-    if checks.equivalences:
-        yield Statement("comparison", _comparison(checks), "compared", _compare_files(checks))
-    yield from _dynamics(checks)
+    yield from _comparison(checks)
     yield from _standing(checks, robot)
     yield from _responses(checks)
     yield Statement("joints", _joints(robot))
@@ -279,39 +277,26 @@ def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 # Verify
 
 
-def _compare_files(checks: "Verification") -> str:
-    equivalences = checks.equivalences
-    distance = max(equivalence.distance for equivalence in equivalences)
-    mass = max(abs(equivalence.mass) for equivalence in equivalences)
-    files = " and ".join(equivalence.file for equivalence in equivalences)
-    return (
-        f"{files} match the source: link positions within {1000 * distance:.2g} mm at {NUM_POSES} "
-        f"poses, mass within {mass:.2g}"
-    )
-
-
-def _dynamics(checks: "Verification") -> Iterator[Statement]:
-    if checks.dynamics is None:
-        return
-    if checks.dynamics_error:
-        text = f"not compared: {checks.dynamics_error}"
-    elif checks.dynamics:
-        text = f"robot.xml differs from the source: {'; '.join(checks.dynamics)}"
-    else:
-        text = "robot.xml has the masses, forces and constraints of the source at 30 states"
-    yield Statement("comparison", [f"Dynamics: {cell(text)}.\n"], "dynamics", text)
-
-
-def _comparison(checks: "Verification") -> Iterator[str]:
-    yield "Largest errors at random poses.\n"
-    rows = [("file", "mass", "joint inertia", "link position", "link rotation")]
-    for found in checks.equivalences:
-        mass = f"{round(found.mass, 5) + 0.0:+.3%}"
-        inertia = f"{found.inertia:.3%} at {found.joint}" if found.joint else ""
-        position = f"{1000 * found.distance:.2g} mm at {found.link}"
-        rotation = f"{math.degrees(found.angle):.2g} deg at {found.angle_link}"
-        rows.append((found.file, mass, inertia, position, rotation))
-    yield from _table(rows)
+def _comparison(checks: "Verification") -> Iterator[Statement]:
+    """Yield the largest errors, and one line for each difference from the source."""
+    errors = {compared.file: compared.errors for compared in checks.comparisons}
+    if errors:
+        found = "differ from" if checks.differences else "match"
+        text = f"{' and '.join(errors)} {found} the source at {NUM_STATES} states"
+        for what in ("link position", "mass matrix"):
+            error = max(of_file.get(what, (0.0, "")) for of_file in errors.values())
+            text += f", {what} within {error_text(what, (error[0], ''))}"
+        lines = f"Largest errors at {NUM_STATES} random states, relative unless with a unit.\n"
+        rows = [["file", *errors]]
+        for what in dict.fromkeys(what for of_file in errors.values() for what in of_file):
+            cells = (error_text(what, of_file.get(what, (0.0, ""))) for of_file in errors.values())
+            rows.append([what, *cells])
+        yield Statement("comparison", (lines, *_table(rows)), "compared", text)
+    for text in checks.differences:
+        yield Statement("comparison", [f"- {cell(text)}\n"], "differs", text)
+    if checks.uncompared:
+        text = f"springs, constraints and actuators were not compared: {checks.uncompared}"
+        yield Statement("comparison", [f"- {cell(text)}\n"], "compared", text)
 
 
 def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:

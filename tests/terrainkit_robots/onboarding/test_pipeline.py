@@ -265,7 +265,7 @@ def test_onboard_reports_failed_standing_test(tmp_path, monkeypatch):
     checks = result.verification
     assert (checks.standing, checks.is_stable) == (None, False)
     assert checks.failures == ("it could not be simulated: why",)
-    assert [each.file for each in checks.equivalences] == ["robot.urdf", "robot.xml"]
+    assert [each.file for each in checks.comparisons] == ["robot.urdf", "robot.xml"]
     assert "It was not simulated: why." in (result.folder / "report.md").read_text()
 
 

@@ -1,4 +1,4 @@
-"""robot.xml has everything of an MJCF that moves the robot, and what it lacks is named."""
+"""The written files have everything that moves the robot, and what they lack is named."""
 
 import re
 
@@ -6,9 +6,12 @@ import mujoco
 import pytest
 
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.onboarding.dynamics import dynamics_differences
+from terrainkit_robots.onboarding.comparison import compare_models
+from terrainkit_robots.onboarding.folder import write_files
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.onboarding.verify import verify
+from tests.robots import QUADRUPED
 
 SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="plane" size="1 1 1"/>
 <body name="base" pos="0 0 1"><freejoint/><geom size="0.1" mass="3"/>
@@ -49,7 +52,7 @@ WELD = '<weld body1="e" body2="d" relpose="0 0 0.1 0.9 0.1 0 0" anchor="0 0.01 0
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """A source, and the result of its onboarding."""
-    folder = tmp_path_factory.mktemp("dynamics")
+    folder = tmp_path_factory.mktemp("comparison")
     (folder / "m.xml").write_text(SOURCE.format(weld=WELD))
     options = OnboardOptions(render_images=False, force=True)
     return folder / "m.xml", onboard(folder / "m.xml", folder / "out", options)
@@ -57,7 +60,7 @@ def written(tmp_path_factory):
 
 def test_onboard_keeps_what_moves_the_robot(written):
     _, result = written
-    assert result.verification.dynamics == ()
+    assert result.verification.differences == ()
     model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
     assert (model.neq, model.ntendon) == (5, 2)
 
@@ -75,7 +78,9 @@ def test_onboard_keeps_what_moves_the_robot(written):
         (r'springref="0\.087\d*"', "", "springs, damping and actuators"),
         (r'gravcomp="0.5"', "", "springs, damping and actuators"),
         (r'kp="30"', 'kp="31"', "springs, damping and actuators"),
-        (r'mass="0.3', 'mass="0.4', "mass matrix"),
+        (r'mass="0.3', 'mass="0.302', "mass matrix"),
+        (r'(<key name="home" qpos="[^"]* )[^ "]+', r"\g<1>0.09", "another keyframe of je"),
+        (r'type="box" size="0.1', 'type="box" size="0.11', "contact parameters of 1 of"),
         (r'frictionloss="0.1"', "", "friction of jb"),
         (r'friction="0.3 0.1 0.02"', "", "contact parameters of 1 of"),
         (r'name="jb"([^>]*)range="[^"]*"', r'name="jb"\1range="-1 1"', "limits of jb"),
@@ -86,7 +91,59 @@ def test_differences_are_named(written, pattern, replacement, named):
     text, count = re.subn(pattern, replacement, (result.folder / "robot.xml").read_text(), count=1)
     assert count == 1
     models = mujoco.MjModel.from_xml_path(str(source)), mujoco.MjModel.from_xml_string(text)
-    assert any(named in phrase for phrase in dynamics_differences(*models))
+    assert any(named in phrase for phrase in differences(result, *models))
+
+
+def differences(result, source, written):
+    facts = result.robot.facts
+    compared = compare_models(
+        "robot.xml", source, written, base="base", mass=facts.total_mass, pose=facts.default_pose
+    )
+    return compared.differences
+
+
+@pytest.fixture(scope="module")
+def quadruped(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("quadruped")
+    return onboard(QUADRUPED, folder / "out", OnboardOptions(render_images=False))
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "replacement", "named"),
+    [
+        ("robot.urdf", "0 0 -0.213", "0 0 -0.214", "link position by 1 mm at FL_foot"),
+        # 2 atan(0.02 / 0.9998) is 2.29 degrees.
+        (
+            "robot.xml",
+            'name="FL_calf" pos="[^"]*"',
+            r'\g<0> quat="0.9998 0 0.02 0"',
+            "link rotation by 2.3 deg at FL_calf",
+        ),
+        (
+            "robot.urdf",
+            '(name="FL_calf_joint".*?xyz=")0 1 0',
+            r"\g<1>0 -1 0",
+            "link rotation by 1.8e+02 deg at FL_calf",
+        ),
+        # 0.8 g of 15 kg are less than the tolerance of the total mass, but the calf is light.
+        ("robot.xml", '"0.154"', '"0.1548"', "mass matrix by"),
+        ("robot.urdf", "0.00548 -0.000975 -0.115", "0.00548 -0.000975 -0.125", "mass matrix by"),
+        ("robot.urdf", '(FL_calf_joint".*?lower=")-', r"\1-1", "limits of FL_calf_joint"),
+        ("robot.urdf", 'FL_calf_joint" type="[a-z]*', 'FL_calf_joint" type="fixed', "without the"),
+    ],
+)
+def test_differences_of_each_file_are_named(tmp_path, quadruped, file, pattern, replacement, named):
+    robot = quadruped.robot
+    assert quadruped.verification.differences == ()
+    text, count = re.subn(
+        pattern, replacement, robot.files[file].decode(), count=1, flags=re.DOTALL
+    )
+    assert count == 1
+    write_files(tmp_path, {**robot.files, file: text.encode()})
+    found = verify(quadruped.report.facts, robot, tmp_path).differences
+    assert found
+    assert all(phrase.startswith(f"{file} differs from the source: ") for phrase in found)
+    assert any(named in phrase for phrase in found)
 
 
 def test_constraints_that_hold_the_robot_are_left_out(tmp_path):
@@ -113,4 +170,4 @@ def test_actuators_of_tendons_are_named(written):
         mujoco.MjModel.from_xml_string(text),
         mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml")),
     )
-    assert dynamics_differences(*models) == ("without 1 actuator of tendons or bodies",)
+    assert differences(result, *models) == ("without 1 actuator of tendons or bodies",)
