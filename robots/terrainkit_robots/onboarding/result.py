@@ -46,3 +46,9 @@ class OnboardResult:
 
     edits: tuple[str, ...] = ()
     """Names of the files that keep user edits of the replaced folder."""
+
+    @property
+    def mass_errors(self) -> tuple[str, ...]:
+        """Codes of the errors about masses that remain: no simulation of the robot is judged."""
+        findings = (f for f in self.report.findings if f.is_blocking)
+        return tuple(dict.fromkeys(f.code for f in findings if f.family in ("INR", "UNI")))

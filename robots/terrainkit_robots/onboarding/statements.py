@@ -89,7 +89,11 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
         return
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
     yield from _comparison(checks)
-    yield from _standing(checks, robot)
+    if checks.standing is not None and result.mass_errors:
+        text = f"not judged: errors about masses remain ({names(result.mass_errors)})"
+        yield Statement("standing", [f"Its standing is {text}.\n"], "standing", text)
+    else:
+        yield from _standing(checks, robot)
     yield from _responses(checks)
     yield Statement("joints", _joints(robot))
     yield Statement("orders", _simulators(robot))
