@@ -240,30 +240,33 @@ def make_side(
     )
 
 
-def _settings(side: Side) -> dict[str, Matrix]:
-    """Return settings of each joint that no state shows, shape (joints, 1 or 2) each."""
-    model, joints = side.model, list(side.joints)
-    is_limited = model.jnt_limited[joints, None].astype(bool)
-    return {
-        "limits": np.where(is_limited, model.jnt_range[joints], np.inf),
-        "friction": model.dof_frictionloss[side.dofs, None],
-        "effort limits": _effort_limits(side)[:, None],
-        "armature": model.dof_armature[side.dofs, None],
-    }
-
-
-def _changed_settings(source: Side, written: Side) -> dict[str, Matrix]:
-    """Return whether each joint has another setting than in the source, by setting."""
-    before, after = _settings(source), _settings(written)
+def _changed_settings(source: Side, written: Side) -> dict[str, Any]:
+    """Return whether each joint has another setting, which no state shows, by setting."""
+    before, after = (
+        {
+            "limits": _ranges(side),
+            "friction": side.model.dof_frictionloss[side.dofs, None],
+            "effort limits": _effort_limits(side)[:, None],
+            "armature": side.model.dof_armature[side.dofs, None],
+        }
+        for side in (source, written)
+    )
     # A servo without a limit gets one, and stiff gains may need more armature at the time step of
     # training, see robot.toml.
-    effort, armature = before["effort limits"], before["armature"]
-    after["effort limits"][np.isinf(effort)] = np.inf
-    after["armature"] = np.minimum(after["armature"], armature)
+    after["effort limits"][np.isinf(before["effort limits"])] = np.inf
+    after["armature"] = np.minimum(after["armature"], before["armature"])
+    rtol = {"limits": 1e-6, "effort limits": 0.01}
     return {
-        name: ~np.isclose(before[name], after[name], rtol=5e-3, atol=1e-6).all(axis=1)
-        for name in before
+        name: ~np.isclose(value, after[name], rtol=rtol.get(name, 1e-3), atol=1e-6).all(axis=1)
+        for name, value in before.items()
     }
+
+
+def _ranges(side: Side) -> Matrix:
+    """Return the limits of each joint, infinite without limits, shape (joints, 2)."""
+    joints = list(side.joints)
+    is_limited = side.model.jnt_limited[joints, None].astype(bool)
+    return np.where(is_limited, side.model.jnt_range[joints], [-np.inf, np.inf])
 
 
 def _effort_limits(side: Side) -> Matrix:
@@ -285,10 +288,7 @@ def _states(source: Side, written: Side, *, compare_actuators: bool) -> Iterator
 
     rng = np.random.default_rng(0)
     model = source.model
-    low, high = model.jnt_range[list(source.joints)].T.copy()
-    is_free = ~model.jnt_limited[list(source.joints)].astype(bool) | (low >= high)
-    low[is_free], high[is_free] = -_MAX_POSITION, _MAX_POSITION
-    low, high = np.clip((low, high), -_MAX_POSITION, _MAX_POSITION)
+    low, high = np.clip(_ranges(source), -_MAX_POSITION, _MAX_POSITION).T
     shared = [k for k in source.servos if compare_actuators and k in written.servos]
     both_free = source.free >= 0 and written.free >= 0
     for _ in range(NUM_STATES):
@@ -353,7 +353,7 @@ def _close(side: Side) -> None:
         violation = data.efc_pos[rows]
         if np.abs(violation).max(initial=0.0) < 1e-9:
             break
-        jacobian = data.efc_J.reshape(-1, model.nv)[rows]
+        jacobian = data.efc_J.reshape(data.nefc, model.nv)[rows]
         step = np.zeros(model.nv)
         step[side.dofs] = -np.linalg.pinv(jacobian[:, side.dofs], rcond=1e-6) @ violation
         mujoco.mj_integratePos(model, data.qpos, step, 1.0)
@@ -372,7 +372,7 @@ def _quantities(side: Side, shared: list[int], both_free: bool) -> dict[str, Mat
         mujoco.mj_mulM(model, data, mass[column], unit)
     mass -= np.diag(model.dof_armature)  # compared on its own, since onboarding adds it
     rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    jacobian = data.efc_J.reshape(-1, model.nv)[rows]
+    jacobian = data.efc_J.reshape(data.nefc, model.nv)[rows]
     force = data.qfrc_passive[dofs]
     # A motor has no target. Its joint is compared without the force of the written controller.
     for k in shared:

@@ -304,16 +304,21 @@ def _comparison(checks: "Verification") -> Iterator[Statement]:
 
 
 def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:
-    lines = _standing_lines(checks, robot) if robot.facts.legs else ()
-    yield Statement("standing", lines, "standing", _standing_text(checks, robot))
+    text, lines = _standing_text(checks, robot), []
+    if robot.facts.legs:
+        lines = [f"{cell(text[0].upper() + text[1:])}.\n"]
+    if checks.standing is not None:
+        has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
+        unit = "rad or m" if has_slides else "rad"
+        rows = _standing_rows(checks.standing, unit, locked=checks.joints_locked)
+        lines += _table([("quantity", "value"), *rows])
+    yield Statement("standing", lines, "standing", text)
     if checks.free_standing is None:
         return
     failures = assess(checks.free_standing).failures
     how = f"{checks.free_standing.seconds:g} s with the gains of robot.toml and without a policy"
     text = f"no, a policy has to balance it: {how}; {failures[0]}" if failures else f"yes: {how}"
-    outcome = f"it does not stand: {'; '.join(failures)}" if failures else "it stands as well"
-    line = f"With the gains below and without a policy, {cell(outcome)}.\n"
-    yield Statement("standing", [line], "free", text)
+    yield Statement("standing", [f"With free joints: {cell(text)}.\n"], "free", text)
 
 
 def _responses(checks: "Verification") -> Iterator[Statement]:
@@ -351,24 +356,6 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
         return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
-
-
-def _standing_lines(checks: "Verification", robot: "RobotFiles") -> Iterator[str]:
-    if checks.standing is None:
-        reason = cell(checks.error or checks.skipped)
-        yield f"It was not simulated{reason and f': {reason}'}.\n"
-        return
-    how = "at its default pose, with the gains below"
-    if checks.joints_locked:
-        how = "with locked joints"
-    if checks.stand_gains:
-        how = "at its default pose, with suggested gains"
-    outcome = "It stands" if checks.is_stable else "It does not stand"
-    yield f"**{outcome}**, {how}, in MuJoCo:\n"
-    has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
-    unit = "rad or m" if has_slides else "rad"
-    rows = _standing_rows(checks.standing, unit, locked=checks.joints_locked)
-    yield from _table([("quantity", "value"), *rows])
 
 
 def _standing_rows(

@@ -5,11 +5,13 @@ import re
 import mujoco
 import pytest
 
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.comparison import compare_models
 from terrainkit_robots.onboarding.folder import write_files
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.onboarding.source_model import load_source
 from terrainkit_robots.onboarding.verify import verify
 from tests.robots import QUADRUPED
 
@@ -27,6 +29,8 @@ SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="p
         <site name="end" pos="0 0 0.01"/></body>
     </body>
   </body>
+  <body name="f" pos="0 0.1 0"><joint name="jf" type="ball"/>
+    <geom size="0.02" pos="0.01 0 -0.1" mass="0.1"/></body>
   <body name="c" pos="-0.1 0 0">
     <joint name="jc" axis="1 0 0" range="-60 60" springdamper="0.3 1"/>
     <geom size="0.05" pos="0 0 -0.1" mass="0.2"/>
@@ -82,6 +86,7 @@ def test_onboard_keeps_what_moves_the_robot(written):
         (r'(<key name="home" qpos="[^"]* )[^ "]+', r"\g<1>0.09", "another keyframe of je"),
         (r'type="box" size="0.1', 'type="box" size="0.11', "contact parameters of 1 of"),
         (r'frictionloss="0.1"', "", "friction of jb"),
+        (r'(name="jf_y"[^>]*axis=")0 1 0', r"\g<1>0 -1 0", "link rotation by"),
         (r'friction="0.3 0.1 0.02"', "", "contact parameters of 1 of"),
         (r'name="jb"([^>]*)range="[^"]*"', r'name="jb"\1range="-1 1"', "limits of jb"),
     ],
@@ -90,14 +95,14 @@ def test_differences_are_named(written, pattern, replacement, named):
     source, result = written
     text, count = re.subn(pattern, replacement, (result.folder / "robot.xml").read_text(), count=1)
     assert count == 1
-    models = mujoco.MjModel.from_xml_path(str(source)), mujoco.MjModel.from_xml_string(text)
-    assert any(named in phrase for phrase in differences(result, *models))
+    found = differences(result, source, mujoco.MjModel.from_xml_string(text))
+    assert any(named in phrase for phrase in found)
 
 
 def differences(result, source, written):
-    facts = result.robot.facts
+    facts, model = result.robot.facts, load_source(Facts(load_robot(source)))
     compared = compare_models(
-        "robot.xml", source, written, base="base", mass=facts.total_mass, pose=facts.default_pose
+        "robot.xml", model, written, base="base", mass=facts.total_mass, pose=facts.default_pose
     )
     return compared.differences
 
@@ -163,11 +168,10 @@ def test_joint_with_a_motor_is_no_mimic(tmp_path):
     assert all(joint.mimic is None for joint in robot.joints)
 
 
-def test_actuators_of_tendons_are_named(written):
+def test_actuators_of_tendons_are_named(tmp_path, written):
     source, result = written
     text = source.read_text().replace("</actuator>", '<motor name="pull" tendon="sum"/></actuator>')
-    models = (
-        mujoco.MjModel.from_xml_string(text),
-        mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml")),
-    )
-    assert differences(result, *models) == ("without 1 actuator of tendons or bodies",)
+    (tmp_path / "m.xml").write_text(text)
+    model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    found = differences(result, tmp_path / "m.xml", model)
+    assert found == ("without 1 actuator of tendons or bodies",)

@@ -109,7 +109,7 @@ def test_report_without_results(quadruped):
     assert "\nNo pictures: MuJoCo cannot render here.\n" in text
     assert "![" not in text
     assert "Nothing was fixed, omitted or changed." in section(text, "Changes")
-    assert section(text, "Standing test").strip() == "It was not simulated."
+    assert section(text, "Standing test").strip() == "Not simulated: the robot has a fixed base."
     assert "## Comparison with the source" not in text
 
 
@@ -117,7 +117,7 @@ def test_report_failed_standing_test(quadruped, stood):
     fell = replace(stood, tilt=1.5, other_contacts=("base", "FL_hip"), diverged=True, seconds=0.3)
     verification = Verification(standing=fell, joints_locked=True)
     text = section(report_markdown(replace(quadruped, verification=verification)), "Standing test")
-    assert "**It does not stand**, with locked joints" in text
+    assert text.strip().startswith("NO: 0.3 s with locked joints, since bipeds")
     assert "| ground contacts | base, FL\\_hip |" in text
     assert "| duration | 0.3 s; then the simulation became unstable |" in text
     assert "largest torque" not in text
