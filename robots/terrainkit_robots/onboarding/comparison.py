@@ -126,8 +126,7 @@ def compare_models(
     mass: float,
     pose: Mapping[str, float],
     base_joints: Collection[str] = (),
-    compare_forces: bool = True,
-    compare_actuators: bool = True,
+    ignored: Collection[str] = (),
 ) -> Comparison:
     """Return the differences of a written model from its source.
 
@@ -139,28 +138,20 @@ def compare_models(
         mass: Mass of the source [kg].
         pose: Joint positions of the first keyframe of the written file, if it has one.
         base_joints: Joints of the source that a free joint replaces.
-        compare_forces: Whether springs, constraints, actuators and shapes are compared as well.
-        compare_actuators: Whether position actuators have to have the gains of the source.
+        ignored: What is not compared: `forces` of springs, actuators and constraints with their
+            settings, gains of `actuators`, or `shapes`.
     """
+    import mujoco
+
     source_names, written_names = joint_names_of(source), joint_names_of(written)
     joint_names = [name for name in written_names if name in set(source_names)]
     frames = {written.body(k).name for k in range(written.nbody)}
     frames |= {written.site(k).name for k in range(written.nsite)}
     links = [name for k in range(1, source.nbody) if (name := source.body(k).name) in frames]
-    sides = tuple(make_side(model, joint_names, base, links) for model in (source, written))
-    total = float(written.body_mass.sum())
-    errors = {"mass": (abs(total / mass - 1) if mass else total, "")}
-    with quiet_mujoco():
-        for side in sides:
-            _isolate(side, written.opt.timestep)
-        for state in _states(*sides, compare_actuators=compare_actuators):
-            for name, error in state.items():
-                if not error.size or (not compare_forces and name in _FORCES[2:]):
-                    continue
-                place = int(error.argmax())
-                if name not in errors or not error[place] <= errors[name][0]:
-                    places = [*joint_names, *["the base"] * 6] if name in _FORCES else links
-                    errors[name] = float(error[place]), places[place]
+    sides = (
+        make_side(source, joint_names, base, links),
+        make_side(written, joint_names, base, links),
+    )
     changed = {
         "without the joints": [n for n in source_names if n not in {*joint_names, *base_joints}],
         "with the joints": [name for name in written_names if name not in source_names],
@@ -171,12 +162,39 @@ def compare_models(
         is_other = ~np.isclose(held, expected, atol=1e-6)
         changed["another keyframe of"] = list(compress(joint_names, is_other))
     for what, is_other in _changed_settings(*sides).items():
-        if compare_forces or what in ("limits", "friction"):
+        if "forces" not in ignored or what in ("limits", "friction"):
             changed[f"{what} of"] = list(compress(joint_names, is_other))
     changes = [f"{what} {names(joints, max_count=4)}" for what, joints in changed.items() if joints]
-    if compare_forces:
-        changes += _lost_parts(*sides)
+    others = int((source.actuator_trntype != int(mujoco.mjtTrn.mjTRN_JOINT)).sum())
+    if others and "forces" not in ignored:
+        changes.append(f"without {count(others, 'actuator')} of tendons or bodies")
+    kinds, written_kinds = (_contact_kinds(side) for side in sides)
+    lost = (kinds - written_kinds).total()
+    if lost and "shapes" not in ignored:
+        changes.append(f"contact parameters of {lost} of {kinds.total()} shapes")
+    total = float(written.body_mass.sum())
+    errors = {"mass": (abs(total / mass - 1) if mass else total, "")}
+    places = {"link position": links, "link rotation": links}
+    for name, error in _largest_errors(*sides, ignored).items():
+        if error.size:
+            place = int(error.argmax())
+            where = places.get(name, [*joint_names, *["the base"] * 6])[place]
+            errors[name] = float(error[place]), where
     return Comparison(file=file, errors=errors, changes=tuple(changes))
+
+
+def _largest_errors(source: Side, written: Side, ignored: Collection[str]) -> dict[str, Matrix]:
+    """Return the largest error of each quantity at random states, by link or by joint."""
+    with quiet_mujoco():
+        for side in (source, written):
+            _isolate(side, written.model.opt.timestep)
+        states = list(_states(source, written, has_targets="actuators" not in ignored))
+    left_out = _FORCES[2:] if "forces" in ignored else ()
+    return {
+        name: np.max([state[name] for state in states], axis=0)
+        for name in states[0]
+        if name not in left_out
+    }
 
 
 def _isolate(side: Side, time_step: float) -> None:
@@ -282,14 +300,14 @@ def _effort_limits(side: Side) -> Matrix:
     return limits
 
 
-def _states(source: Side, written: Side, *, compare_actuators: bool) -> Iterator[dict[str, Matrix]]:
+def _states(source: Side, written: Side, *, has_targets: bool) -> Iterator[dict[str, Matrix]]:
     """Yield the errors of each quantity at random states, by link or by joint."""
     import mujoco
 
     rng = np.random.default_rng(0)
     model = source.model
     low, high = np.clip(_ranges(source), -_MAX_POSITION, _MAX_POSITION).T
-    shared = [k for k in source.servos if compare_actuators and k in written.servos]
+    shared = [k for k in source.servos if has_targets and k in written.servos]
     both_free = source.free >= 0 and written.free >= 0
     for _ in range(NUM_STATES):
         source.data.qpos[:] = model.qpos0
@@ -384,19 +402,6 @@ def _quantities(side: Side, shared: list[int], both_free: bool) -> dict[str, Mat
         "violation of constraints": (jacobian.T @ data.efc_pos[rows])[dofs],
         "acceleration that constraints demand": (jacobian.T @ data.efc_aref[rows])[dofs],
     }
-
-
-def _lost_parts(source: Side, written: Side) -> Iterator[str]:
-    """Yield which actuators and contact parameters of the source the written model lacks."""
-    import mujoco
-
-    others = int((source.model.actuator_trntype != int(mujoco.mjtTrn.mjTRN_JOINT)).sum())
-    if others:
-        yield f"without {count(others, 'actuator')} of tendons or bodies"
-    kinds, written_kinds = _contact_kinds(source), _contact_kinds(written)
-    lost = (kinds - written_kinds).total()
-    if lost:
-        yield f"contact parameters of {lost} of {kinds.total()} shapes"
 
 
 def _contact_kinds(side: Side) -> Counter[tuple[float, ...]]:

@@ -1,6 +1,6 @@
 """Verify an onboarded robot: its files match the source, and it stands in simulation."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -90,7 +90,7 @@ def verify(
     folder: Path,
     *,
     soft_gains: bool = False,
-    compare_actuators: bool = True,
+    ignored: Collection[str] = (),
 ) -> Verification:
     """Compare the files of a folder with their source, and simulate the standing pose.
 
@@ -99,7 +99,7 @@ def verify(
         robot: The robot that was written.
         folder: The folder with its files.
         soft_gains: Whether the gains of the spec need not hold the pose without a policy.
-        compare_actuators: Whether the gains of the spec have to be those of an MJCF source.
+        ignored: What options change, which is not compared; see `compare_models`.
 
     Raises:
         ExportError: if MuJoCo cannot load the files.
@@ -126,7 +126,7 @@ def verify(
         if scales[response.joint]
     )
     verification = replace(
-        _compare(source, robot, {URDF: urdf_model, MJCF: scene_model}, compare_actuators),
+        _compare(source, robot, {URDF: urdf_model, MJCF: scene_model}, ignored),
         responses=responses,
     )
     if not robot.facts.legs or not floating:
@@ -163,7 +163,7 @@ def verify(
 
 
 def _compare(
-    source: "Facts", robot: "RobotFiles", models: Mapping[str, Any], compare_actuators: bool
+    source: "Facts", robot: "RobotFiles", models: Mapping[str, Any], ignored: Collection[str]
 ) -> Verification:
     """Return the comparison of the models of the written files with their source."""
     written = robot.facts
@@ -186,8 +186,7 @@ def _compare(
             mass=described.total_mass,
             pose=written.default_pose,
             base_joints=[joint.name for joint in source.base_joints],
-            compare_forces=file == MJCF and not uncompared,
-            compare_actuators=compare_actuators,
+            ignored=ignored if file == MJCF and not uncompared else ("forces", "shapes"),
         )
         for file, model in models.items()
     )

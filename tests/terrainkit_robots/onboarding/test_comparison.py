@@ -48,7 +48,8 @@ SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="p
 <tendon><spatial name="cable" stiffness="20" damping="2"><site site="hook"/><site site="end"/>
   </spatial><fixed name="sum" stiffness="4" range="-1 1"><joint joint="jb" coef="1"/>
   <joint joint="jc" coef="-2"/></fixed></tendon>
-<actuator><position name="pa" joint="ja" kp="30" dampratio="0.7" ctrlrange="-1 1"/>
+<actuator><position name="pa" joint="ja" kp="30" dampratio="0.7" ctrlrange="-1 1"
+  forcerange="-20 20"/>
   <motor name="mb" joint="jb" gear="2" ctrlrange="-3 3"/></actuator></mujoco>"""
 WELD = '<weld body1="e" body2="d" relpose="0 0 0.1 0.9 0.1 0 0" anchor="0 0.01 0" torquescale="2"/>'
 
@@ -87,6 +88,7 @@ def test_onboard_keeps_what_moves_the_robot(written):
         (r'type="box" size="0.1', 'type="box" size="0.11', "contact parameters of 1 of"),
         (r'frictionloss="0.1"', "", "friction of jb"),
         (r'(name="jf_y"[^>]*axis=")0 1 0', r"\g<1>0 -1 0", "link rotation by"),
+        (r'forcerange="-20 20"', 'forcerange="-30 30"', "effort limits of ja"),
         (r'friction="0.3 0.1 0.02"', "", "contact parameters of 1 of"),
         (r'name="jb"([^>]*)range="[^"]*"', r'name="jb"\1range="-1 1"', "limits of jb"),
     ],
