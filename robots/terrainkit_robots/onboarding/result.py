@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.onboarding.convert import RobotFiles
@@ -48,7 +49,8 @@ class OnboardResult:
     """Names of the files that keep user edits of the replaced folder."""
 
     @property
-    def mass_errors(self) -> tuple[str, ...]:
-        """Codes of the errors about masses that remain: no simulation of the robot is judged."""
-        findings = (f for f in self.report.findings if f.is_blocking)
-        return tuple(dict.fromkeys(f.code for f in findings if f.family in ("INR", "UNI")))
+    def unjudged(self) -> str:
+        """Why the standing of the robot says nothing: errors about masses or units, or empty."""
+        errors = (f for f in self.report.findings if f.is_blocking and f.family in ("INR", "UNI"))
+        codes = names(dict.fromkeys(finding.code for finding in errors))
+        return codes and f"not judged: errors about masses or units remain ({codes})"

@@ -89,8 +89,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
         return
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
     yield from _comparison(checks)
-    if checks.standing is not None and result.mass_errors:
-        text = f"not judged: errors about masses remain ({names(result.mass_errors)})"
+    if checks.standing is not None and (text := result.unjudged):
         yield Statement("standing", [f"Its standing is {text}.\n"], "standing", text)
     else:
         yield from _standing(checks, robot)

@@ -40,7 +40,7 @@ def lines(monkeypatch, stood):
             "images": (),
             "images_error": "no display",
             "edits": (),
-            "mass_errors": (),
+            "unjudged": "",
         }
         return dict(summarize(SimpleNamespace(**result | given)))
 
@@ -103,7 +103,7 @@ def test_summary_lists_what_else_happened(lines):
             "yes: 5 s with locked joints, since bipeds need a controller to balance, tilt",
         ),
         ({"verified": {"stand_gains": True}}, "yes: 5 s with suggested gains, which"),
-        ({"mass_errors": ("INR005",)}, "not judged: errors about masses remain (INR005)"),
+        ({"unjudged": "not judged: errors remain"}, "not judged: errors remain"),
     ],
 )
 def test_summary_says_how_the_robot_stood(lines, options, text):
