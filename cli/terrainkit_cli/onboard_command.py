@@ -34,10 +34,10 @@ class Onboard(Command):
     robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
     that it stands. The input file is never changed.
 
-    Exit code 0: the folder was written. 1: errors prevent that, or robot.xml moves differently
-    than an MJCF file; with --strict, also if errors remain in the file, the robot does not stand,
-    or a framework was skipped. 2: a file cannot be
-    read or written, or an option is invalid.
+    Exit code 0: the folder was written. 1: errors prevent that, or the written robot moves
+    differently than the file; with --strict, also if errors remain in the file, the robot does not
+    stand, or a framework was skipped. 2: a file cannot be read or written, or an option is
+    invalid.
     """
 
     file: Annotated[str, positional("FILE")] = ""
@@ -123,9 +123,7 @@ class Onboard(Command):
         for warning in warnings:
             render.note(f"warning: {self.file}: {warning}")
         checks = result.verification
-        return int(
-            (self.strict and bool(warnings)) or (checks is not None and bool(checks.dynamics))
-        )
+        return int(bool((self.strict and warnings) or (checks and checks.differences)))
 
     def _options(self, steps: render.Steps) -> "OnboardOptions":
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (

@@ -553,7 +553,7 @@ class RobotModel:
     """Tendons; MJCF only."""
 
     left_out: tuple[str, ...] = ()
-    """Constraints and tendons of the file that the model does not have, one phrase each."""
+    """Constraints, tendons and keyframes that the model does not have, one phrase each."""
 
     problems: tuple[Problem, ...] = ()
     """What could not be read."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.onboarding.convert import RobotFiles
@@ -46,3 +47,10 @@ class OnboardResult:
 
     edits: tuple[str, ...] = ()
     """Names of the files that keep user edits of the replaced folder."""
+
+    @property
+    def unjudged(self) -> str:
+        """Why the standing of the robot says nothing: errors about masses or units, or empty."""
+        errors = (f for f in self.report.findings if f.is_blocking and f.family in ("INR", "UNI"))
+        codes = names(dict.fromkeys(finding.code for finding in errors))
+        return codes and f"not judged: errors about masses or units remain ({codes})"

@@ -1,4 +1,4 @@
-"""The MJCF source of a robot as MuJoCo loads it, and the gains that MuJoCo computes."""
+"""The source of a robot as a MuJoCo model, and the gains that MuJoCo computes."""
 
 import os
 from dataclasses import replace
@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit.errors import one_line
+from terrainkit.errors import ExportError, one_line
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description.model import Dynamics, Joint
 from terrainkit_robots.description.xml.document import RobotFileError, read_bytes
-from terrainkit_robots.onboarding.dynamics import Side, joint_names_of, make_side
+from terrainkit_robots.onboarding.comparison import Side, joint_names_of, make_side
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.written_model import remove_drawings
+from terrainkit_robots.transforms import matrix_to_quat
 
 
 @cached_fact
@@ -40,9 +42,98 @@ def load_source(facts: Facts) -> Any:
             spec = mujoco.MjSpec.from_string(texts[file.name].decode(), include=texts)
             spec.modelfiledir = str(file.parent)
             remove_drawings(spec)  # their meshes may be missing
+            _replace_balls(spec)
             return spec.compile()
     except (ValueError, RuntimeError, RobotFileError, mujoco.FatalError) as error:
         raise CannotCheckError(f"MuJoCo does not load the source: {one_line(str(error))}") from None
+
+
+def _replace_balls(spec: Any) -> None:
+    """Replace the ball joints below the base by hinges about x, y and z, as the written files."""
+    import mujoco
+
+    balls = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_BALL]
+    for ball in balls:
+        body = ball.parent
+        if body.parent == spec.worldbody:
+            continue
+        for letter, axis in zip("xyz", np.eye(3), strict=True):
+            hinge = body.add_joint(name=f"{ball.name}_{letter}", pos=ball.pos, axis=axis)
+            hinge.type, hinge.limited = (
+                mujoco.mjtJoint.mjJNT_HINGE,
+                mujoco.mjtLimited.mjLIMITED_FALSE,
+            )
+            for name in ("range", "damping", "stiffness", "armature", "frictionloss"):
+                setattr(hinge, name, 0 * hinge.range if name == "range" else getattr(ball, name))
+        spec.delete(ball)
+        for key in spec.keys:  # it has other positions
+            spec.delete(key)
+
+
+def described_model(facts: Facts, written: Facts) -> Any:
+    """Return a `mujoco.MjModel` of the links, joints and masses that were read from a file.
+
+    It shares no code with the files that onboarding writes, and needs no valid inertias.
+
+    Args:
+        facts: The robot.
+        written: The written robot, whose joints may have other names.
+
+    Raises:
+        ExportError: If MuJoCo rejects it.
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    joint_names = {joint.child: joint.name for joint in written.joints}
+    top = facts.bodies[0].top.name
+    bodies = {top: spec.worldbody.add_body(name=written.bodies[0].top.name)}
+    if written.model.floating:
+        bodies[top].add_freejoint()
+    for name in facts.tree.order:
+        if name == top or name not in facts.body_of:
+            continue
+        joint = facts.tree.parent_joint[name]
+        bodies[name] = bodies[joint.parent].add_body(
+            name=name, pos=joint.origin[:3, 3], quat=matrix_to_quat(joint.origin[:3, :3])
+        )
+        if joint.moves:
+            is_slide = joint.kind == "prismatic"
+            bodies[name].add_joint(
+                name=joint_names.get(name, joint.name),
+                type=mujoco.mjtJoint.mjJNT_SLIDE if is_slide else mujoco.mjtJoint.mjJNT_HINGE,
+                axis=joint.direction,
+                pos=joint.anchor,
+                ref=joint.reference,
+                range=joint.range or (0, 0),
+                limited=joint.range is not None,
+                damping=[max(joint.damping, 0.0), 0, 0],
+                frictionloss=max(joint.friction, 0.0),
+            )
+    for joint in mimic_joints(facts.joints):
+        assert joint.mimic is not None
+        spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            name1=joint.name,
+            name2=joint.mimic.joint,
+            data=[joint.mimic.offset, joint.mimic.multiplier, *[0] * 10],
+        )
+    moments = {}
+    for body in facts.bodies:
+        made = bodies[body.top.name]
+        moments[made.name], axes = np.linalg.eigh(body.inertia)
+        made.explicitinertial, made.mass, made.inertia = True, 1, np.ones(3)
+        made.ipos, made.iquat = body.center, matrix_to_quat(axes * np.linalg.det(axes))
+    try:
+        with quiet_mujoco():
+            model = spec.compile()
+    except ValueError as error:
+        raise ExportError(f"MuJoCo rejects {facts.model.file}: {one_line(str(error))}") from None
+    for body, (name, principal) in zip(facts.bodies, moments.items(), strict=True):
+        model.body(name).mass, model.body(name).inertia = body.mass, principal
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
 def with_compiled_gains(facts: Facts) -> Facts:

@@ -18,7 +18,7 @@ from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
 from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
 from terrainkit_robots.lint.rule import SEVERITIES, Finding
-from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.onboarding.comparison import NUM_STATES, error_text
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess
@@ -88,10 +88,11 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
     if robot is None or checks is None:
         return
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
-    if checks.equivalences:
-        yield Statement("comparison", _comparison(checks), "compared", _compare_files(checks))
-    yield from _dynamics(checks)
-    yield from _standing(checks, robot)
+    yield from _comparison(checks)
+    if checks.standing is not None and (text := result.unjudged):
+        yield Statement("standing", [f"Its standing is {text}.\n"], "standing", text)
+    else:
+        yield from _standing(checks, robot)
     yield from _responses(checks)
     yield Statement("joints", _joints(robot))
     yield Statement("orders", _simulators(robot))
@@ -279,52 +280,44 @@ def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 # Verify
 
 
-def _compare_files(checks: "Verification") -> str:
-    equivalences = checks.equivalences
-    distance = max(equivalence.distance for equivalence in equivalences)
-    mass = max(abs(equivalence.mass) for equivalence in equivalences)
-    files = " and ".join(equivalence.file for equivalence in equivalences)
-    return (
-        f"{files} match the source: link positions within {1000 * distance:.2g} mm at {NUM_POSES} "
-        f"poses, mass within {mass:.2g}"
-    )
-
-
-def _dynamics(checks: "Verification") -> Iterator[Statement]:
-    if checks.dynamics is None:
-        return
-    if checks.dynamics_error:
-        text = f"not compared: {checks.dynamics_error}"
-    elif checks.dynamics:
-        text = f"robot.xml differs from the source: {'; '.join(checks.dynamics)}"
-    else:
-        text = "robot.xml has the masses, forces and constraints of the source at 30 states"
-    yield Statement("comparison", [f"Dynamics: {cell(text)}.\n"], "dynamics", text)
-
-
-def _comparison(checks: "Verification") -> Iterator[str]:
-    yield "Largest errors at random poses.\n"
-    rows = [("file", "mass", "joint inertia", "link position", "link rotation")]
-    for found in checks.equivalences:
-        mass = f"{round(found.mass, 5) + 0.0:+.3%}"
-        inertia = f"{found.inertia:.3%} at {found.joint}" if found.joint else ""
-        position = f"{1000 * found.distance:.2g} mm at {found.link}"
-        rotation = f"{math.degrees(found.angle):.2g} deg at {found.angle_link}"
-        rows.append((found.file, mass, inertia, position, rotation))
-    yield from _table(rows)
+def _comparison(checks: "Verification") -> Iterator[Statement]:
+    """Yield the largest errors, and one line for each difference from the source."""
+    errors = {compared.file: compared.errors for compared in checks.comparisons}
+    if errors:
+        found = "differ from" if checks.differences else "match"
+        text = f"{' and '.join(errors)} {found} the source at {NUM_STATES} states"
+        for what in ("link position", "mass matrix"):
+            error = max(of_file.get(what, (0.0, "")) for of_file in errors.values())
+            text += f", {what} within {error_text(what, (error[0], ''))}"
+        lines = f"Largest errors at {NUM_STATES} random states, relative unless with a unit.\n"
+        rows = [["file", *errors]]
+        for what in dict.fromkeys(what for of_file in errors.values() for what in of_file):
+            cells = (error_text(what, of_file.get(what, (0.0, ""))) for of_file in errors.values())
+            rows.append([what, *cells])
+        yield Statement("comparison", (lines, *_table(rows)), "compared", text)
+    for text in checks.differences:
+        yield Statement("comparison", [f"- {cell(text)}\n"], "differs", text)
+    if checks.uncompared:
+        text = f"springs, constraints and actuators were not compared: {checks.uncompared}"
+        yield Statement("comparison", [f"- {cell(text)}\n"], "compared", text)
 
 
 def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:
-    lines = _standing_lines(checks, robot) if robot.facts.legs else ()
-    yield Statement("standing", lines, "standing", _standing_text(checks, robot))
+    text, lines = _standing_text(checks, robot), []
+    if robot.facts.legs:
+        lines = [f"{cell(text[0].upper() + text[1:])}.\n"]
+    if checks.standing is not None:
+        has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
+        unit = "rad or m" if has_slides else "rad"
+        rows = _standing_rows(checks.standing, unit, locked=checks.joints_locked)
+        lines += _table([("quantity", "value"), *rows])
+    yield Statement("standing", lines, "standing", text)
     if checks.free_standing is None:
         return
     failures = assess(checks.free_standing).failures
     how = f"{checks.free_standing.seconds:g} s with the gains of robot.toml and without a policy"
     text = f"no, a policy has to balance it: {how}; {failures[0]}" if failures else f"yes: {how}"
-    outcome = f"it does not stand: {'; '.join(failures)}" if failures else "it stands as well"
-    line = f"With the gains below and without a policy, {cell(outcome)}.\n"
-    yield Statement("standing", [line], "free", text)
+    yield Statement("standing", [f"With free joints: {cell(text)}.\n"], "free", text)
 
 
 def _responses(checks: "Verification") -> Iterator[Statement]:
@@ -362,24 +355,6 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
         return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
-
-
-def _standing_lines(checks: "Verification", robot: "RobotFiles") -> Iterator[str]:
-    if checks.standing is None:
-        reason = cell(checks.error or checks.skipped)
-        yield f"It was not simulated{reason and f': {reason}'}.\n"
-        return
-    how = "at its default pose, with the gains below"
-    if checks.joints_locked:
-        how = "with locked joints"
-    if checks.stand_gains:
-        how = "at its default pose, with suggested gains"
-    outcome = "It stands" if checks.is_stable else "It does not stand"
-    yield f"**{outcome}**, {how}, in MuJoCo:\n"
-    has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
-    unit = "rad or m" if has_slides else "rad"
-    rows = _standing_rows(checks.standing, unit, locked=checks.joints_locked)
-    yield from _table([("quantity", "value"), *rows])
 
 
 def _standing_rows(

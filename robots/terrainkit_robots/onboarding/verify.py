@@ -1,5 +1,6 @@
 """Verify an onboarded robot: its files match the source, and it stands in simulation."""
 
+from collections.abc import Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,14 +12,9 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
 from terrainkit_robots.export.base_link import with_world_base
+from terrainkit_robots.onboarding.comparison import Comparison, compare_models
 from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
-from terrainkit_robots.onboarding.dynamics import dynamics_differences
-from terrainkit_robots.onboarding.equivalence import (
-    Equivalence,
-    compare_models,
-    reference_kinematics,
-)
-from terrainkit_robots.onboarding.source_model import load_source
+from terrainkit_robots.onboarding.source_model import described_model, load_source
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
 
@@ -38,14 +34,11 @@ _DURATION = 5.0
 class Verification:
     """The result of verifying the written files."""
 
-    equivalences: tuple[Equivalence, ...]
+    comparisons: tuple[Comparison, ...] = ()
     """Differences of each file from the source."""
 
-    dynamics: tuple[str, ...] | None = None
-    """Differences of the dynamics of robot.xml from an MJCF source; None for a URDF source."""
-
-    dynamics_error: str = ""
-    """The reason why the dynamics were not compared."""
+    uncompared: str = ""
+    """The reason why MuJoCo cannot load an MJCF source, whose forces are then not compared."""
 
     responses: "tuple[StepResponse, ...]" = ()
     """How the joints that a policy moves follow a step of their targets."""
@@ -70,6 +63,15 @@ class Verification:
     """The reason why there is no standing test for a robot that only a controller balances."""
 
     @property
+    def differences(self) -> tuple[str, ...]:
+        """What differs from the source, one sentence each."""
+        return tuple(
+            f"{compared.file} differs from the source: {phrase}"
+            for compared in self.comparisons
+            for phrase in compared.differences
+        )
+
+    @property
     def failures(self) -> tuple[str, ...]:
         """The reasons why the robot does not stand; empty if it stands, or has no legs."""
         if self.standing is None:
@@ -88,7 +90,7 @@ def verify(
     folder: Path,
     *,
     soft_gains: bool = False,
-    compare_actuators: bool = True,
+    ignored: Collection[str] = (),
 ) -> Verification:
     """Compare the files of a folder with their source, and simulate the standing pose.
 
@@ -97,10 +99,10 @@ def verify(
         robot: The robot that was written.
         folder: The folder with its files.
         soft_gains: Whether the gains of the spec need not hold the pose without a policy.
-        compare_actuators: Whether the gains of the spec have to be those of an MJCF source.
+        ignored: What options change, which is not compared; see `compare_models`.
 
     Raises:
-        ExportError: if MuJoCo cannot load the files, or they differ from the source.
+        ExportError: if MuJoCo cannot load the files.
     """
     from terrainkit_robots.simulation.pd_gains import suggest_gains
     from terrainkit_robots.simulation.sim_model import SimModel
@@ -116,34 +118,17 @@ def verify(
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
         urdf, scene = (executor.submit(_load_model, folder / name) for name in (URDF, SCENE))
-        reference = reference_kinematics(
-            with_world_base(with_hinges_for_balls(source), floating=floating), robot.facts
-        )
     (_, urdf_model), (scene_spec, scene_model) = urdf.result(), scene.result()
-    equivalences = compare_models(reference, {URDF: urdf_model, MJCF: scene_model})
-    for equivalence in equivalences:
-        if equivalence.failures:
-            raise ExportError(
-                f"{equivalence.file} differs from the source: {'; '.join(equivalence.failures)}"
-            )
     scales = robot.spec.per_joint("action_scale")
     responses = tuple(
         response
         for response in step_responses(scene_model, scene_model.key_qpos[0])
         if scales[response.joint]
     )
-    verification = Verification(equivalences=equivalences, responses=responses)
-    if source.model.kind == "mjcf":
-        try:
-            differences = dynamics_differences(
-                load_source(source),
-                scene_model,
-                base_joints=[joint.name for joint in source.base_joints],
-                compare_actuators=compare_actuators,
-            )
-            verification = replace(verification, dynamics=differences)
-        except CannotCheckError as error:
-            verification = replace(verification, dynamics=(), dynamics_error=str(error))
+    verification = replace(
+        _compare(source, robot, {URDF: urdf_model, MJCF: scene_model}, ignored),
+        responses=responses,
+    )
     if not robot.facts.legs or not floating:
         return verification
     # A biped falls with any gains unless a policy balances it. With locked joints, the test still
@@ -175,6 +160,37 @@ def verify(
         stand_gains=stand_gains,
         free_standing=free_standing,
     )
+
+
+def _compare(
+    source: "Facts", robot: "RobotFiles", models: Mapping[str, Any], ignored: Collection[str]
+) -> Verification:
+    """Return the comparison of the models of the written files with their source."""
+    written = robot.facts
+    described = with_world_base(
+        with_hinges_for_balls(source), floating=bool(written.model.floating)
+    )
+    uncompared, reference = "", None
+    if source.model.kind == "mjcf":
+        try:
+            reference = load_source(source)
+        except CannotCheckError as error:
+            uncompared = str(error)
+    reference = reference or described_model(described, written)
+    comparisons = tuple(
+        compare_models(
+            file,
+            reference,
+            model,
+            base=written.bodies[0].top.name,
+            mass=described.total_mass,
+            pose=written.default_pose,
+            base_joints=[joint.name for joint in source.base_joints],
+            ignored=ignored if file == MJCF and not uncompared else ("forces", "shapes"),
+        )
+        for file, model in models.items()
+    )
+    return Verification(comparisons=comparisons, uncompared=uncompared)
 
 
 def _load_model(path: Path) -> tuple[Any, Any]:

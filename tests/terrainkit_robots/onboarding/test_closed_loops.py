@@ -68,7 +68,7 @@ def test_five_bar_legs_stand_with_their_loops(result):
     assert [leg.foot for leg in result.robot.facts.legs] == [
         f"{leg}_front_lower" for leg in ("FL", "FR", "RL", "RR")
     ]
-    assert (checks.dynamics, checks.failures) == ((), ())
+    assert (checks.differences, checks.failures) == ((), ())
     assert len(checks.responses) == 8
     assert all(response.failure == "" for response in checks.responses)
 

@@ -265,8 +265,8 @@ def test_onboard_reports_failed_standing_test(tmp_path, monkeypatch):
     checks = result.verification
     assert (checks.standing, checks.is_stable) == (None, False)
     assert checks.failures == ("it could not be simulated: why",)
-    assert [each.file for each in checks.equivalences] == ["robot.urdf", "robot.xml"]
-    assert "It was not simulated: why." in (result.folder / "report.md").read_text()
+    assert [each.file for each in checks.comparisons] == ["robot.urdf", "robot.xml"]
+    assert "Not simulated: why." in (result.folder / "report.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -359,7 +359,7 @@ def test_onboard_uses_declared_gains(tmp_path):
 def test_onboard_biped_reports_free_standing(onboarded):
     result = onboarded(bundled.urdf_path("biped"))
     assert dict(summarize(result))["free"].startswith("no, a policy has to balance it: ")
-    assert "without a policy, it does not stand" in (result.folder / "report.md").read_text()
+    assert "With free joints: no, a policy has to" in (result.folder / "report.md").read_text()
 
 
 def test_onboard_replaces_placeholder_efforts(tmp_path):

@@ -12,9 +12,9 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
+from terrainkit_robots.onboarding.comparison import Comparison
 from terrainkit_robots.onboarding.convert import RobotFiles
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-from terrainkit_robots.onboarding.equivalence import Equivalence
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown
 from terrainkit_robots.onboarding.verify import Verification
@@ -28,10 +28,9 @@ ARM = """<robot name="arm"><link name="base"/><link name="tip"/>
 <joint name="j" type="continuous"><parent link="base"/><child link="tip"/></joint></robot>"""
 
 
-def equivalence(file="robot.urdf", link="FL_foot"):
-    differences = {"mass": -0.0004, "inertia": 2e-5, "distance": 2.5e-5, "angle": 1e-5}
-    names = {"joint": "FL_calf_joint", "link": link, "angle_link": "RR_foot"}
-    return Equivalence(file=file, **differences, **names)
+def comparison(file="robot.urdf", link="FL_foot"):
+    errors = {"mass": (0.0004, ""), "link position": (2.5e-5, link), "link rotation": (0.0, link)}
+    return Comparison(file=file, errors=errors, changes=(f"limits of {link}",))
 
 
 def make_result(text=None):
@@ -42,7 +41,7 @@ def make_result(text=None):
     spec = derive_spec(facts, gains=gains, floating=bool(facts.legs))
     robot = RobotFiles(facts=facts, spec=spec, files={}, changes=())
     report = Report(facts=facts, findings=())
-    verification = Verification(equivalences=())
+    verification = Verification()
     return OnboardResult(report=report, folder=Path("out"), robot=robot, verification=verification)
 
 
@@ -87,7 +86,7 @@ def test_report_of_a_quadruped(quadruped, stood, monkeypatch):
         images=("report/front.png", "report/side.png"),
         fixed=(finding(fix=fix), finding(subject="")),
         robot=replace(quadruped.robot, changes=("the wheel | was left out",)),
-        verification=Verification(equivalences=(equivalence(),), standing=stood),
+        verification=Verification(comparisons=(comparison(),), standing=stood),
         report=Report(facts=facts, findings=(finding(severity="warning"),), skipped=skipped),
         configs={"mjlab": ("mjlab_config.py",), "isaaclab": ("isaaclab_config.py",)},
     )
@@ -110,15 +109,15 @@ def test_report_without_results(quadruped):
     assert "\nNo pictures: MuJoCo cannot render here.\n" in text
     assert "![" not in text
     assert "Nothing was fixed, omitted or changed." in section(text, "Changes")
-    assert section(text, "Standing test").strip() == "It was not simulated."
+    assert section(text, "Standing test").strip() == "Not simulated: the robot has a fixed base."
     assert "## Comparison with the source" not in text
 
 
 def test_report_failed_standing_test(quadruped, stood):
     fell = replace(stood, tilt=1.5, other_contacts=("base", "FL_hip"), diverged=True, seconds=0.3)
-    verification = Verification(equivalences=(), standing=fell, joints_locked=True)
+    verification = Verification(standing=fell, joints_locked=True)
     text = section(report_markdown(replace(quadruped, verification=verification)), "Standing test")
-    assert "**It does not stand**, with locked joints" in text
+    assert text.strip().startswith("NO: 0.3 s with locked joints, since bipeds")
     assert "| ground contacts | base, FL\\_hip |" in text
     assert "| duration | 0.3 s; then the simulation became unstable |" in text
     assert "largest torque" not in text
@@ -147,7 +146,7 @@ def test_report_escapes_names(quadruped, stood):
     held = NASTY.replace("\udc80", "")  # which a spec refuses
     named = with_spec(quadruped, name=held, base=held, feet=(held,))
     standing = replace(stood, other_contacts=(NASTY,), saturated_joint=NASTY)
-    compared = equivalence(NASTY, link=NASTY)
+    compared = comparison(NASTY, link=NASTY)
     text = report_markdown(
         replace(
             named,
@@ -157,7 +156,7 @@ def test_report_escapes_names(quadruped, stood):
                 findings=(finding(NASTY, subject=NASTY, message=NASTY, hint=NASTY),),
                 skipped=(Skipped(code="SYM001", kind="cannot-check", reason=NASTY),),
             ),
-            verification=Verification(equivalences=(compared,), standing=standing),
+            verification=Verification(comparisons=(compared,), standing=standing),
             fixed=(finding(subject=NASTY, message=NASTY),),
             configs={"isaaclab": (NASTY,)},
             images_error=NASTY,

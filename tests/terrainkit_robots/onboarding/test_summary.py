@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 from terrainkit_robots.onboarding import statements
-from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.onboarding.comparison import Comparison
 from terrainkit_robots.onboarding.statements import summarize
 from terrainkit_robots.onboarding.verify import Verification
 
@@ -20,19 +20,19 @@ def finding(code, subject, onboarding="repairs"):
 def lines(monkeypatch, stood):
     """Return a function that summarizes a robot that stood; keywords replace results."""
     monkeypatch.setattr(statements, "summarize_findings", lambda _: "2 findings")
-    equivalences = (
-        SimpleNamespace(file="robot.urdf", distance=2e-6, mass=-3e-9),
-        SimpleNamespace(file="robot.xml", distance=1e-6, mass=1e-9),
+    comparisons = (
+        Comparison(file="robot.urdf", errors={"link position": (2e-6, "foot")}),
+        Comparison(file="robot.xml", errors={"link position": (1e-6, "foot")}),
     )
 
     def run(standing=stood, files=(), legs=(1,), changes=(), missing=0, verified=None, **given):
-        checks = Verification(equivalences=equivalences, standing=standing, **(verified or {}))
+        checks = Verification(comparisons=comparisons, standing=standing, **(verified or {}))
         findings = [finding("MSH001", "")] * missing + [finding("MSH002", "", "converts")]
         result = {
             "report": SimpleNamespace(findings=findings),
             "fixed": (),
             "robot": SimpleNamespace(
-                files=dict(files), facts=SimpleNamespace(legs=legs), changes=changes
+                files=dict(files), facts=SimpleNamespace(legs=legs, joints=()), changes=changes
             ),
             "verification": checks,
             "configs": {},
@@ -40,6 +40,7 @@ def lines(monkeypatch, stood):
             "images": (),
             "images_error": "no display",
             "edits": (),
+            "unjudged": "",
         }
         return dict(summarize(SimpleNamespace(**result | given)))
 
@@ -51,8 +52,8 @@ def test_summary_of_a_plain_robot(lines):
     assert lines(files=files) == {
         "checked": "2 findings",
         "wrote": "robot.urdf, 2 mesh files (1.5 MB)",
-        "compared": "robot.urdf and robot.xml match the source: link positions within 0.002 mm at "
-        f"{NUM_POSES} poses, mass within 3e-09",
+        "compared": "robot.urdf and robot.xml match the source at 30 states, link position within "
+        "0.002 mm, mass matrix within 0",
         "standing": "yes: 5 s with the gains of robot.toml, tilt 0.6 degrees, only the feet touch "
         "the ground",
         "pictures": "none: no display",
@@ -102,6 +103,7 @@ def test_summary_lists_what_else_happened(lines):
             "yes: 5 s with locked joints, since bipeds need a controller to balance, tilt",
         ),
         ({"verified": {"stand_gains": True}}, "yes: 5 s with suggested gains, which"),
+        ({"unjudged": "not judged: errors remain"}, "not judged: errors remain"),
     ],
 )
 def test_summary_says_how_the_robot_stood(lines, options, text):

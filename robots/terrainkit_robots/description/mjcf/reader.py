@@ -59,6 +59,7 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     import mujoco
@@ -174,7 +175,7 @@ class _SpecReader:
             loops=tuple(constraints.loops),
             couplings=tuple(constraints.couplings),
             tendons=tuple(constraints.tendons),
-            left_out=tuple(constraints.left_out),
+            left_out=(*constraints.left_out, *self._left_keyframes()),
         )
 
     def _check_euler_angles(self) -> None:
@@ -422,6 +423,12 @@ class _SpecReader:
                 "MuJoCo rejects the file",
             )
         return (low, high) if written or joint.limited == limited.mjLIMITED_TRUE else None
+
+    def _left_keyframes(self) -> Iterator[str]:
+        """Yield one phrase on the keyframes after the first one, which is read."""
+        others = [key.name or "without a name" for key in self._spec.keys if len(key.qpos)][1:]
+        if others:
+            yield f"the keyframes after the first: {names(others, max_count=4)}"
 
     def _keyframe_positions(self, joints: Sequence[Joint]) -> dict[str, float]:
         """Return the joint positions of the first keyframe that has any."""

@@ -1,14 +1,19 @@
-"""robot.xml has everything of an MJCF that moves the robot, and what it lacks is named."""
+"""The written files have everything that moves the robot, and what they lack is named."""
 
 import re
 
 import mujoco
 import pytest
 
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.onboarding.dynamics import dynamics_differences
+from terrainkit_robots.onboarding.comparison import compare_models
+from terrainkit_robots.onboarding.folder import write_files
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.onboarding.source_model import load_source
+from terrainkit_robots.onboarding.verify import verify
+from tests.robots import QUADRUPED
 
 SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="plane" size="1 1 1"/>
 <body name="base" pos="0 0 1"><freejoint/><geom size="0.1" mass="3"/>
@@ -24,6 +29,8 @@ SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="p
         <site name="end" pos="0 0 0.01"/></body>
     </body>
   </body>
+  <body name="f" pos="0 0.1 0"><joint name="jf" type="ball"/>
+    <geom size="0.02" pos="0.01 0 -0.1" mass="0.1"/></body>
   <body name="c" pos="-0.1 0 0">
     <joint name="jc" axis="1 0 0" range="-60 60" springdamper="0.3 1"/>
     <geom size="0.05" pos="0 0 -0.1" mass="0.2"/>
@@ -41,7 +48,8 @@ SOURCE = """<mujoco model="m"><compiler angle="degree"/><worldbody><geom type="p
 <tendon><spatial name="cable" stiffness="20" damping="2"><site site="hook"/><site site="end"/>
   </spatial><fixed name="sum" stiffness="4" range="-1 1"><joint joint="jb" coef="1"/>
   <joint joint="jc" coef="-2"/></fixed></tendon>
-<actuator><position name="pa" joint="ja" kp="30" dampratio="0.7" ctrlrange="-1 1"/>
+<actuator><position name="pa" joint="ja" kp="30" dampratio="0.7" ctrlrange="-1 1"
+  forcerange="-20 20"/>
   <motor name="mb" joint="jb" gear="2" ctrlrange="-3 3"/></actuator></mujoco>"""
 WELD = '<weld body1="e" body2="d" relpose="0 0 0.1 0.9 0.1 0 0" anchor="0 0.01 0" torquescale="2"/>'
 
@@ -49,7 +57,7 @@ WELD = '<weld body1="e" body2="d" relpose="0 0 0.1 0.9 0.1 0 0" anchor="0 0.01 0
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """A source, and the result of its onboarding."""
-    folder = tmp_path_factory.mktemp("dynamics")
+    folder = tmp_path_factory.mktemp("comparison")
     (folder / "m.xml").write_text(SOURCE.format(weld=WELD))
     options = OnboardOptions(render_images=False, force=True)
     return folder / "m.xml", onboard(folder / "m.xml", folder / "out", options)
@@ -57,7 +65,7 @@ def written(tmp_path_factory):
 
 def test_onboard_keeps_what_moves_the_robot(written):
     _, result = written
-    assert result.verification.dynamics == ()
+    assert result.verification.differences == ()
     model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
     assert (model.neq, model.ntendon) == (5, 2)
 
@@ -75,8 +83,12 @@ def test_onboard_keeps_what_moves_the_robot(written):
         (r'springref="0\.087\d*"', "", "springs, damping and actuators"),
         (r'gravcomp="0.5"', "", "springs, damping and actuators"),
         (r'kp="30"', 'kp="31"', "springs, damping and actuators"),
-        (r'mass="0.3', 'mass="0.4', "mass matrix"),
+        (r'mass="0.3', 'mass="0.302', "mass matrix"),
+        (r'(<key name="home" qpos="[^"]* )[^ "]+', r"\g<1>0.09", "another keyframe of je"),
+        (r'type="box" size="0.1', 'type="box" size="0.11', "contact parameters of 1 of"),
         (r'frictionloss="0.1"', "", "friction of jb"),
+        (r'(name="jf_y"[^>]*axis=")0 1 0', r"\g<1>0 -1 0", "link rotation by"),
+        (r'forcerange="-20 20"', 'forcerange="-30 30"', "effort limits of ja"),
         (r'friction="0.3 0.1 0.02"', "", "contact parameters of 1 of"),
         (r'name="jb"([^>]*)range="[^"]*"', r'name="jb"\1range="-1 1"', "limits of jb"),
     ],
@@ -85,8 +97,60 @@ def test_differences_are_named(written, pattern, replacement, named):
     source, result = written
     text, count = re.subn(pattern, replacement, (result.folder / "robot.xml").read_text(), count=1)
     assert count == 1
-    models = mujoco.MjModel.from_xml_path(str(source)), mujoco.MjModel.from_xml_string(text)
-    assert any(named in phrase for phrase in dynamics_differences(*models))
+    found = differences(result, source, mujoco.MjModel.from_xml_string(text))
+    assert any(named in phrase for phrase in found)
+
+
+def differences(result, source, written):
+    facts, model = result.robot.facts, load_source(Facts(load_robot(source)))
+    compared = compare_models(
+        "robot.xml", model, written, base="base", mass=facts.total_mass, pose=facts.default_pose
+    )
+    return compared.differences
+
+
+@pytest.fixture(scope="module")
+def quadruped(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("quadruped")
+    return onboard(QUADRUPED, folder / "out", OnboardOptions(render_images=False))
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "replacement", "named"),
+    [
+        ("robot.urdf", "0 0 -0.213", "0 0 -0.214", "link position by 1 mm at FL_foot"),
+        # 2 atan(0.02 / 0.9998) is 2.29 degrees.
+        (
+            "robot.xml",
+            'name="FL_calf" pos="[^"]*"',
+            r'\g<0> quat="0.9998 0 0.02 0"',
+            "link rotation by 2.3 deg at FL_calf",
+        ),
+        (
+            "robot.urdf",
+            '(name="FL_calf_joint".*?xyz=")0 1 0',
+            r"\g<1>0 -1 0",
+            "link rotation by 1.8e+02 deg at FL_calf",
+        ),
+        # 0.8 g of 15 kg are less than the tolerance of the total mass, but the calf is light.
+        ("robot.xml", '"0.154"', '"0.1548"', "mass matrix by"),
+        ("robot.urdf", "0.00548 -0.000975 -0.115", "0.00548 -0.000975 -0.125", "mass matrix by"),
+        ("robot.urdf", '(FL_calf_joint".*?lower=")-', r"\1-1", "limits of FL_calf_joint"),
+        ("robot.urdf", 'FL_calf_joint" type="[a-z]*', 'FL_calf_joint" type="fixed', "without the"),
+    ],
+)
+def test_differences_of_each_file_are_named(tmp_path, quadruped, file, pattern, replacement, named):
+    robot = quadruped.robot
+    assert quadruped.verification.differences == ()
+    text, count = re.subn(
+        pattern, replacement, robot.files[file].decode(), count=1, flags=re.DOTALL
+    )
+    assert count == 1
+    write_files(tmp_path, {**robot.files, file: text.encode()})
+    found = verify(quadruped.report.facts, robot, tmp_path).differences
+    assert found
+    assert all(phrase.startswith(f"{file} differs from the source: ") for phrase in found)
+    assert any(named in phrase for phrase in found)
 
 
 def test_constraints_that_hold_the_robot_are_left_out(tmp_path):
@@ -106,11 +170,10 @@ def test_joint_with_a_motor_is_no_mimic(tmp_path):
     assert all(joint.mimic is None for joint in robot.joints)
 
 
-def test_actuators_of_tendons_are_named(written):
+def test_actuators_of_tendons_are_named(tmp_path, written):
     source, result = written
     text = source.read_text().replace("</actuator>", '<motor name="pull" tendon="sum"/></actuator>')
-    models = (
-        mujoco.MjModel.from_xml_string(text),
-        mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml")),
-    )
-    assert dynamics_differences(*models) == ("without 1 actuator of tendons or bodies",)
+    (tmp_path / "m.xml").write_text(text)
+    model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    found = differences(result, tmp_path / "m.xml", model)
+    assert found == ("without 1 actuator of tendons or bodies",)
