@@ -33,8 +33,8 @@ from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
-from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.description.model import Source
+from terrainkit_robots.description.fix import Fix, Source
+from terrainkit_robots.description.fix import Part as Part
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -142,13 +142,7 @@ class Violation:
     """One sentence with the measured value, its unit and the threshold."""
 
     element: Element | None = None
-    """What violates the rule, such as a link or a joint. By default, the robot."""
-
-    subject: str | None = None
-    """Name of the link, joint, mesh or file. By default, the name of the element."""
-
-    source: Source | None = None
-    """File and line. By default, file and line of the element."""
+    """What violates the rule, such as a link, a joint or a part of it. By default, the robot."""
 
     hint: str = ""
     """How to correct it. By default, the `Fix:` section of the rule."""
@@ -181,7 +175,11 @@ class Finding(Violation):
     """Name of the rule, such as `negative-mass`."""
 
     subject: str
+    """Name of the element."""
+
     source: Source
+    """File and line."""
+
     severity: Severity
     certainty: Certainty
     onboarding: Onboarding = "reports"
@@ -248,15 +246,13 @@ class Rule:
     def findings(self, robot: "Facts") -> Iterator[Finding]:
         """Yield the violations on a robot with their defaults filled in."""
         for violation in self._violations(robot):
-            element, subject = violation.element, violation.subject
-            if subject is None:
-                subject = robot.model.title if element is None else element.name
+            element = violation.element or Part(robot.model.title, robot.model.source)
             yield Finding(
                 code=self.code,
                 name=self.name,
                 message=violation.message,
-                subject=subject,
-                source=violation.source or (element or robot.model).source,
+                subject=element.name,
+                source=element.source,
                 hint=violation.hint or self.how_to_fix,
                 severity=violation.severity or self.severity,
                 certainty=violation.certainty or self.certainty,
@@ -270,9 +266,9 @@ class Rule:
         """Yield what the readers recorded under the code, then what the check finds."""
         for problem in robot.model.problems:
             if problem.code == self.code:
+                subject = problem.subject or robot.model.name or problem.source.file.name
                 yield Violation(
-                    subject=problem.subject or robot.model.name or problem.source.file.name,
-                    source=problem.source,
+                    element=Part(subject, problem.source),
                     message=problem.message,
                     severity=problem.severity,
                     fix=problem.fix,

@@ -20,7 +20,7 @@ def empty(monkeypatch):
 
 def check(text=PAGE):
     def negative(robot):
-        yield Violation(subject="a", source=robot.model.source, message="b")
+        yield Violation(element=robot.model, message="b")
 
     negative.__doc__ = text
     return negative

@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.description.model import Geometry, Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
 
@@ -69,8 +69,7 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
                 continue
             assert collision.mesh is not None
             yield Violation(
-                subject=link.name,
-                source=collision.source,
+                element=Part(link.name, collision.source),
                 message=f"collision mesh {Path(collision.mesh.filename).name} of link {link.name}: "
                 f"got {differences[0]} the same mesh of the visual; expected the same pose and "
                 "scale",
@@ -101,8 +100,7 @@ def _turned_cylinders(robot: Facts) -> Violations:
         # One disk across its axis may be a lens that turns; wheels come in pairs.
         if reference.startswith("the visible") or len(across) > 1:
             yield Violation(
-                subject=shape.link,
-                source=shape.geometry.source,
+                element=Part(shape.link, shape.geometry.source),
                 certainty="likely",
                 message=f"axis of the collision cylinder of link {shape.link}: got "
                 f"{math.degrees(angle):.3g} deg to {reference}; expected 0 deg",
@@ -154,8 +152,7 @@ def _resized_primitives(robot: Facts) -> Violations:
     for name, collision, visual, ratio in found:
         if counts[ratio] == 1:
             yield Violation(
-                subject=name,
-                source=collision.size_source or collision.source,
+                element=Part(name, collision.size_source or collision.source),
                 certainty="likely",
                 message=f"size of the collision {collision.shape} of link {name}: got "
                 f"{numbers(collision.size)} m, {ratio:g} times the "
@@ -224,8 +221,7 @@ def collision_outside_visual(robot: Facts) -> Violations:
             share = _share_inside(box, visible)
             if share < _MIN_SHARE_INSIDE:
                 yield Violation(
-                    subject=shape.link,
-                    source=shape.geometry.source,
+                    element=Part(shape.link, shape.geometry.source),
                     message=f"part of the collision {shape.geometry.shape} of link {shape.link} "
                     f"inside of the visible robot: got {share:.0%}; expected at least "
                     f"{_MIN_SHARE_INSIDE:.0%}",

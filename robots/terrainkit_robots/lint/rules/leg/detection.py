@@ -7,7 +7,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import mean_length
 from terrainkit_robots.analysis.legs.limbs import Limb
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 _LEG_COUNTS = (2, 4, 6, 8)
@@ -161,8 +161,7 @@ def leg_points_up(robot: Facts) -> Violations:
         rise = float(limb.tip[2] - start[2])
         reach = float(np.linalg.norm(limb.tip - start))
         yield Violation(
-            subject=leaf.name,
-            source=first.source,
+            element=Part(leaf.name, first.source),
             message=f"height of the end of leg {leaf.name} above joint {first.name}, all joints at "
             f"zero: got {rise:.3f} m, {rise / reach:.0%} of their distance of {reach:.3f} m; "
             f"expected less than {_MAX_RISE:.0%}, and below 0 as for the other legs",

@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import UNITS, Violation, Violations, rule
+from terrainkit_robots.lint.rule import UNITS, Part, Violation, Violations, rule
 from terrainkit_robots.text import conjunction
 
 _MAX_JOINTS = 40
@@ -98,8 +98,7 @@ def merged_feet(robot: Facts) -> Violations:
     more = ", ..." if len(merges) > 1 else ""
     verb = "merges" if len(by) == 1 else "merge"
     yield Violation(
-        subject=foot,
-        source=robot.tree.parent_joint[foot].source,
+        element=Part(foot, robot.tree.parent_joint[foot].source),
         message=(
             f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
             f"({foot} into {next(iter(bodies.values()))}{more})"

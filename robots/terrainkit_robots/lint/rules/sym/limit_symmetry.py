@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
 )
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.lint.rules.sym.mimic import same_way_follower
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules
 from terrainkit_robots.text import contrast, numbers
@@ -52,8 +52,7 @@ def limit_asymmetry(robot: Facts) -> Violations:
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
         yield Violation(
-            subject=odd.joint.name,
-            source=(odd.joint.limit or odd.joint).source,
+            element=Part(odd.joint.name, (odd.joint.limit or odd.joint).source),
             message=f"limits of joint {odd.joint.name}: got {numbers(own, '.5g', ' to ')} {unit}; "
             f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range; "
@@ -115,8 +114,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             parts.append(f"{own:g} {unit}, {share} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             message=f"{' and '.join(differences)} limit of joint {joint.name}: got "
             f"{' and '.join(parts)} of its mirror image {other.joint.name}; expected at "
             f"most {_MAX_LIMIT_DIFFERENCE:.0%}; {reason}",

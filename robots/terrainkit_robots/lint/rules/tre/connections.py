@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import side_words
-from terrainkit_robots.lint.rule import Violation, Violations, get_rule, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, get_rule, rule
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
@@ -92,8 +92,7 @@ def multiple_parents(robot: Facts) -> Violations:
     for child, joints in extra.items():
         listed = names(joint.name for joint in (first[child], *joints))
         yield Violation(
-            subject=child,
-            source=joints[0].source,
+            element=Part(child, joints[0].source),
             message=f"link {truncate(child)}: child of {len(joints) + 1} joints ({listed}); "
             "expected 1",
             measured={"joints": len(joints) + 1},
@@ -122,8 +121,7 @@ def cycle(robot: Facts) -> Violations:
             path = names([links[0], *links[:0:-1], links[0]], sep=" > ")
             size = f"{len(links)} links" if links[1:] else "1 link"
             yield Violation(
-                subject=links[0],
-                source=closing[links[0]].source,
+                element=Part(links[0], closing[links[0]].source),
                 message=f"cycle of {size}: {path}; expected a tree",
                 measured={"links": len(links)},
             )
@@ -147,8 +145,7 @@ def multiple_roots(robot: Facts) -> Violations:
     root, others = _roots(robot.tree)
     for name in others:
         yield Violation(
-            subject=name,
-            source=robot.tree.links[name].source,
+            element=robot.tree.links[name],
             message=f"link {truncate(name)}: has no parent joint, in addition to the root link "
             f"{truncate(root)}; expected 1 root",
         )
@@ -213,8 +210,6 @@ def no_links(robot: Facts) -> Violations:
         raise CannotCheckError("the file could not be read")
     what = "bodies" if model.kind == "mjcf" else "links"
     yield Violation(
-        subject=model.title,
-        source=model.source,
         message=f"number of {what}: got 0, with {len(model.joints)} joints; expected at least 1",
     )
 

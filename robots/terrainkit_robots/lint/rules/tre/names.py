@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 
@@ -39,8 +39,7 @@ def duplicate_name(robot: Facts) -> Violations:
         for name, same in _duplicates(items).items():
             lines = names(str(item.source.line) for item in same)
             yield Violation(
-                subject=name,
-                source=same[1].source,
+                element=Part(name, same[1].source),
                 message=f"name {truncate(name)}: used by {len(same)} {what}, on lines {lines}; "
                 "expected unique names",
                 measured={"count": len(same)},

@@ -8,7 +8,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.joints import (
     MAX_RELATIVE_DIFFERENCE,
     limit_tolerance,
@@ -99,8 +99,7 @@ def _report_group(
     listed = names(joint_name(a, b) for a, b in group)
     joints = f"{len(group)} joints ({listed})" if len(group) > 1 else f"joint {listed}"
     return Violation(
-        subject=one.name,
-        source=(one.limit or one).source,
+        element=Part(one.name, (one.limit or one).source),
         severity=severity,
         message=f"{label} of {joints}: got {difference} "
         f"(line {(other.limit or other).source.line} there)",

@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.text import names
 
@@ -26,9 +26,9 @@ def _report(
     robot: Facts, name: str, message: str, measured: Mapping[str, float] = MappingProxyType({})
 ) -> Violation:
     """Return a violation at the joint or link of that name, or at the robot."""
-    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name)
-    subject = truncate(name) or robot.model.title
-    return Violation(element=element, subject=subject, message=message, measured=measured)
+    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name) or robot.model
+    part = Part(truncate(name) or robot.model.title, element.source)
+    return Violation(element=part, message=message, measured=measured)
 
 
 def _suggest(name: str, candidates: Sequence[str]) -> str:
