@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit_robots.description.model import JointUnits
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.joint_units import JointUnits
 from terrainkit_robots.simulation.rollout import Rollout
 from terrainkit_robots.simulation.sim_model import SimModel
 

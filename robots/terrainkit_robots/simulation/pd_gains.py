@@ -23,7 +23,7 @@ from terrainkit_robots.simulation.stiffness import GainTarget, leg_gain_target, 
 from terrainkit_robots.simulation.time_step import JointInertia, joint_inertia
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.joint_units import JointUnits
+    from terrainkit_robots.description.model import JointUnits
 
 _MIN_STIFFNESS_RATIO = 20.0
 """Stiffness over damping, at least [1/s]. A joint with more damping returns too slowly."""

@@ -13,8 +13,8 @@ import numpy as np
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
+from terrainkit_robots.description.model import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.gain import GainSet
-from terrainkit_robots.simulation.joint_units import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 from terrainkit_robots.simulation.time_step import (
     JointInertia,

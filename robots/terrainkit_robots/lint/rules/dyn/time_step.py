@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import PRISMATIC
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
-from terrainkit_robots.simulation.joint_units import PRISMATIC
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import (

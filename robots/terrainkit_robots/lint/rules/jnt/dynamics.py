@@ -67,7 +67,7 @@ def excessive_friction(robot: Facts) -> Violations:
         limit = _MAX_LEG_FRICTION if joint.name in legs else _MAX_FRICTION
         if effort is None or effort <= 0 or joint.friction <= limit * effort:
             continue
-        share, unit = joint.friction / effort, joint.effort_unit
+        share, unit = joint.friction / effort, joint.units.effort
         yield Violation(
             element=Part(joint.name, (joint.dynamics or joint).source),
             severity="error" if share > 1 else None,

@@ -59,7 +59,7 @@ def missing_effort(robot: Facts) -> Violations:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
     for joint, effort in _missing_limits(robot, "effort"):
-        unit = joint.effort_unit
+        unit = joint.units.effort
         reason = robot.passive_joints.get(joint.name)
         if reason:
             is_open = reason == OPEN_LINKAGE
@@ -125,7 +125,7 @@ def missing_velocity(robot: Facts) -> Violations:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
     for joint, velocity in _missing_limits(robot, "velocity"):
-        unit = joint.speed_unit
+        unit = joint.units.velocity
         is_passive = joint.name in robot.passive_joints
         speed = "largest speed of the part" if is_passive else "no-load speed of the motor"
         yield Violation(
@@ -165,8 +165,8 @@ def placeholder_limit(robot: Facts) -> Violations:
         assert joint.limit is not None
         max_velocity = _MAX_SPIN_VELOCITY if joint.kind == "continuous" else _MAX_VELOCITY
         limits = {
-            "effort": (joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
-            "velocity": (joint.limit.velocity, max_velocity, joint.speed_unit),
+            "effort": (joint.limit.effort, max_effort[joint.units.effort], joint.units.effort),
+            "velocity": (joint.limit.velocity, max_velocity, joint.units.velocity),
         }
         too_large = {
             name: (value, most, unit)

@@ -55,7 +55,7 @@ def insufficient_torque(robot: Facts) -> Violations:
         raise CannotCheckError(f"the mass or joint of {finding.subject} is probably wrong")
     named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
-        share, unit = torque / effort, joint.effort_unit
+        share, unit = torque / effort, joint.units.effort
         got, expected = contrast(share, _MAX_LOAD, ".0%")
         yield Violation(
             element=Part(joint.name, (joint.limit or joint).source),

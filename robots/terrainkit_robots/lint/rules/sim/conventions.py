@@ -163,7 +163,7 @@ def genesis_armature(robot: Facts) -> Violations:
     if not slowed:
         return
     joint = min(moved, key=moved.__getitem__)
-    unit = "kg" if joint.kind == "prismatic" else "kg m2"
+    unit = joint.units.inertia
     yield Violation(
         element=joint,
         message=f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia "

@@ -10,7 +10,6 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.lint.rules.sym.mimic import same_way_follower
@@ -90,7 +89,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
         left, right = pair.left, pair.right
         differences: dict[str, tuple[float, float, float]] = {}
         for name in ("effort", "velocity"):
-            a, b = (_motor_limit(side.joint, name) for side in (left, right))
+            a, b = (getattr(side.joint, name) for side in (left, right))
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = relative_difference(a, b)
@@ -100,7 +99,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             continue
 
         def value(body: Body, name: str = next(iter(differences))) -> Matrix | None:
-            limit = _motor_limit(body.joint, name) if body.joint else None
+            limit = getattr(body.joint, name, None)
             return None if limit is None else np.array([limit])
 
         odd, other, reason = robot.outlier_first(pair, value)
@@ -109,7 +108,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
         measured: dict[str, float | int | str] = {}
         for name, (a, b, difference) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
-            unit = joint.effort_unit if name == "effort" else joint.speed_unit
+            unit = getattr(joint.units, name)
             share, _ = contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")
             parts.append(f"{own:g} {unit}, {share} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
@@ -120,7 +119,3 @@ def effort_asymmetry(robot: Facts) -> Violations:
             f"most {_MAX_LIMIT_DIFFERENCE:.0%}; {reason}",
             measured={**measured, "mirror_image": other.joint.name},
         )
-
-
-def _motor_limit(joint: Joint, name: str) -> float | None:
-    return joint.effort if name == "effort" else joint.velocity

@@ -50,7 +50,7 @@ def compare_limits(robot: Facts) -> Violations:
         )
     velocities = {one.name: (one.velocity, other.velocity) for one, other in pairs}
     for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
-        unit = group[0][0].speed_unit
+        unit = group[0][0].units.velocity
         yield _report_group(
             group,
             "velocity limit",
@@ -129,7 +129,7 @@ def compare_effort(robot: Facts) -> Violations:
         return None if a == b else a
 
     for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
-        unit = group[0][0].effort_unit
+        unit = group[0][0].units.effort
         yield _report_group(
             group,
             "effort limit",

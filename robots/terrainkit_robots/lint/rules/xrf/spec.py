@@ -1,6 +1,6 @@
 """Rules that compare the robot with its robot.toml."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from terrainkit.settings.text import closest, truncate
@@ -265,26 +265,18 @@ def spec_motor_limits(robot: Facts) -> Violations:
     Source:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _check_limits(robot, "effort", lambda j: j.effort, lambda j: j.effort_unit)
-    yield from _check_limits(robot, "velocity", lambda j: j.velocity, lambda j: j.speed_unit)
-
-
-def _check_limits(
-    robot: Facts,
-    table: str,
-    limit_of: Callable[[Joint], float | None],
-    unit_of: Callable[[Joint], str],
-) -> Violations:
     joints = {joint.name: joint for joint in robot.actuated}
-    values = match_joints(getattr(robot.required_spec, table), _table_joints(robot)).values
-    for name, value in values.items():
-        limit, unit = limit_of(joints[name]), unit_of(joints[name])
-        if limit is not None and limit > 0 and value > _MAX_LIMIT_RATIO * limit:
-            message = (
-                f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} times "
-                f"the limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
-            )
-            yield _report(robot, name, message, {table: value, "declared": limit})
+    for table in ("effort", "velocity"):
+        values = match_joints(getattr(robot.required_spec, table), _table_joints(robot)).values
+        for name, value in values.items():
+            limit, unit = (getattr(of, table) for of in (joints[name], joints[name].units))
+            if limit is not None and 0 < _MAX_LIMIT_RATIO * limit < value:
+                message = (
+                    f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} "
+                    f"times the limit of {robot.model.file.name}; expected at most {limit:.4g} "
+                    f"{unit}"
+                )
+                yield _report(robot, name, message, {table: value, "declared": limit})
 
 
 @rule("XRF017", "spec-mirror", "error", needs=("spec",))
