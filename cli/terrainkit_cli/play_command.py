@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath
 from terrainkit_cli.evaluate_command import PolicyCommand, gait_lines, result_rows, summary_line
@@ -41,17 +40,12 @@ class Play(PolicyCommand):
     video: bool = True
     """Write a video; --no-video only prints the table."""
 
-    viewer: bool = False
-    """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""
-
     overwrite: bool = False
     """Replace an existing video."""
 
     def run(self) -> int:
         """Roll out the policy, print the table, and write the video."""
-        if self.viewer and (self.output or not self.video):
-            raise ConfigError("--viewer: got --output or --no-video too; expected it alone")
-        if self.video and not self.viewer:
+        if self.video:
             require_training("imageio_ffmpeg")  # before the rollout
         spec = self.load_spec()
         from terrainkit_robots.rl.run import Run
@@ -63,12 +57,9 @@ class Play(PolicyCommand):
             named = self.policy.stem
         target = self.output or Path(f"{named}.mp4")
         config = self.eval_config(self.seconds)
-        from terrainkit_robots.policy.play import play, view
+        from terrainkit_robots.policy.play import play
         from terrainkit_robots.rendering.video import check_video_path, check_video_size
 
-        if self.viewer:
-            view(spec, config)
-            return 0
         if self.video:
             check_video_size(self.size)
             check_video_path(target, overwrite=self.overwrite)  # before the rollout

@@ -1,10 +1,7 @@
-"""Play a policy: measure it as an evaluation does, and record a video or open a viewer."""
+"""Play a policy: measure it as an evaluation does, and record a video."""
 
-import os
-import sys
-import time
 from dataclasses import dataclass, replace
-from itertools import cycle, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 
@@ -20,8 +17,6 @@ from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.policy_rollout import (
     EvaluationRollout,
     Progress,
-    command_schedule,
-    rollout,
 )
 from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
@@ -97,41 +92,6 @@ def play(
     evaluation.run(load_policy(spec, env), config.seconds, commands, update, stop_early=not video)
     recorded = recorder.make_video(robots, size, scan=height_points) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
-
-
-@single_torch_thread()
-def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
-    """Show one robot in MuJoCo's viewer in real time, until its window is closed.
-
-    Raises:
-        ConfigError: If there is no display, or a run has no policy, or its policy is for another
-            robot.
-    """
-    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
-        raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
-    import mujoco.viewer
-
-    config = replace(config or EvaluationConfig(), num_envs=1)
-    env, commands = make_play_env(spec, config)
-    model = drawn_model(env.scene, env.robot, env.terrain, env.cfg)
-    data = mujoco.MjData(model)
-    schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
-    steps = rollout(env, load_policy(spec, env), cycle(schedule))
-    try:
-        viewer = mujoco.viewer.launch_passive(model, data)
-    except RuntimeError as error:  # macOS needs mjpython
-        raise ConfigError(f"cannot open MuJoCo's viewer: {error}") from None
-    with viewer:
-        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        viewer.cam.trackbodyid = env.scene.base
-        while viewer.is_running():
-            start = time.monotonic()
-            next(steps)
-            with viewer.lock():
-                data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
-                mujoco.mj_forward(model, data)
-            viewer.sync()
-            time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
 
 
 def make_play_env(
