@@ -292,9 +292,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (left.finding, left.reason)
-        for left in result.unfixed
-        if left.finding.fix is not None and left.finding.fix.safety in safeties
+        (finding, reason)
+        for finding, reason in result.unfixed
+        if finding.fix is not None and finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 

@@ -57,13 +57,11 @@ class RemoveElement:
 
 @dataclass(frozen=True, kw_only=True)
 class InsertChild:
-    """Insert an element as the first or last child of another."""
+    """Insert an element as the first child of another, which has children."""
 
     source: Source
     xml: str
     """The element on one line, without indentation."""
-
-    first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,14 +38,6 @@ _NEW_SUFFIXES = frozenset({".stl", ".obj"})
 """Suffixes of files that a fix may create."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Unfixed:
-    """A finding whose fix was not applied or had no effect."""
-
-    finding: Finding
-    reason: str
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FixResult:
     """The result of fixing a robot. Nothing is written yet."""
@@ -62,8 +54,8 @@ class FixResult:
     fixed: tuple[Finding, ...]
     """Findings that no longer occur."""
 
-    unfixed: tuple[Unfixed, ...]
-    """Findings that have a fix and still occur."""
+    unfixed: tuple[tuple[Finding, str], ...]
+    """Findings that have a fix and still occur, and the reasons."""
 
     report: Report
     """The report on the fixed robot."""
@@ -103,7 +95,7 @@ def fix_robot(
         new={files.path[p]: files.current[p] for p in created},
         fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
         unfixed=tuple(
-            Unfixed(finding=f, reason=reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
+            (f, reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
             for f in report.findings
             if f.fix is not None
         ),
