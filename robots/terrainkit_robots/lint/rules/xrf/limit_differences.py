@@ -20,7 +20,7 @@ from terrainkit_robots.lint.rules.xrf.other_robot import (
     other_name,
     other_robot,
 )
-from terrainkit_robots.text import names
+from terrainkit_robots.text import group, names
 
 _Difference = TypeVar("_Difference")
 
@@ -40,19 +40,19 @@ def compare_limits(robot: Facts) -> Violations:
     """
     there = other_name(robot)
     pairs = matching_joints(robot)
-    for _, group in _grouped(pairs, _range_difference):
-        one, other = group[0]
+    for _, same in _grouped(pairs, _range_difference):
+        one, other = same[0]
         yield _report_group(
-            group,
+            same,
             "limits",
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
             f"difference of at most {limit_tolerance(one)} {one.unit}",
         )
     velocities = {one.name: (one.velocity, other.velocity) for one, other in pairs}
-    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
-        unit = group[0][0].units.velocity
+    for (_, a, b), same in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
+        unit = same[0][0].units.velocity
         yield _report_group(
-            group,
+            same,
             "velocity limit",
             f"{a:.6g} {unit} here and {b:.6g} {unit} in {there}; expected a difference of at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
@@ -84,26 +84,22 @@ def _grouped(
     pairs: Sequence[JointPair], key: Callable[[Joint, Joint], _Difference | None]
 ) -> Iterable[tuple[_Difference, list[JointPair]]]:
     """Return each difference with the pairs that have it, without the pairs that agree."""
-    groups: dict[_Difference, list[JointPair]] = {}
-    for one, other in pairs:
-        difference = key(one, other)
-        if difference is not None:
-            groups.setdefault(difference, []).append((one, other))
-    return groups.items()
+    differences = ((key(*pair), pair) for pair in pairs)
+    return group((found, pair) for found, pair in differences if found is not None).items()
 
 
 def _report_group(
-    group: Sequence[JointPair], label: str, difference: str, severity: Severity | None = None
+    same: Sequence[JointPair], label: str, difference: str, severity: Severity | None = None
 ) -> Violation:
-    one, other = group[0]
-    listed = names(joint_name(a, b) for a, b in group)
-    joints = f"{len(group)} joints ({listed})" if len(group) > 1 else f"joint {listed}"
+    one, other = same[0]
+    listed = names(joint_name(a, b) for a, b in same)
+    joints = f"{len(same)} joints ({listed})" if len(same) > 1 else f"joint {listed}"
     return Violation(
         element=Part(one.name, (one.limit or one).source),
         severity=severity,
         message=f"{label} of {joints}: got {difference} "
         f"(line {(other.limit or other).source.line} there)",
-        measured={"joints": len(group)},
+        measured={"joints": len(same)},
     )
 
 
@@ -128,22 +124,22 @@ def compare_effort(robot: Facts) -> Violations:
         a, b = map(bool, efforts[one.name])
         return None if a == b else a
 
-    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
-        unit = group[0][0].units.effort
+    for (_, a, b), same in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
+        unit = same[0][0].units.effort
         yield _report_group(
-            group,
+            same,
             "effort limit",
             f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
             f"{relative_difference(a, b):.1%} apart; expected at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
         )
-    for limited, group in _grouped(pairs, missing):
+    for limited, same in _grouped(pairs, missing):
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
         without = there if limited else "this file"
         note = ", which has no actuators"
         yield _report_group(
-            group,
+            same,
             "effort limit",
             f"none in {without}{'' if has_actuators else note}; expected the limit of "
             f"{'this file' if limited else there}",
