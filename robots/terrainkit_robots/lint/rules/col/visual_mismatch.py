@@ -61,19 +61,16 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
     """
     for link in robot.links:
         for collision in link.collisions:
+            mesh = collision.mesh
             same = [v for v in link.visuals if _is_same_file(collision, v)]
-            if not same or collision.fit_to_mesh:
-                continue
             differences = [_difference(collision, visual) for visual in same]
-            if not all(differences):
-                continue
-            assert collision.mesh is not None
-            yield Violation(
-                element=Part(link.name, collision.source),
-                message=f"collision mesh {Path(collision.mesh.filename).name} of link {link.name}: "
-                f"got {differences[0]} the same mesh of the visual; expected the same pose and "
-                "scale",
-            )
+            if mesh is not None and differences and all(differences) and not collision.fit_to_mesh:
+                yield Violation(
+                    element=Part(link.name, collision.source),
+                    message=f"collision mesh {Path(mesh.filename).name} of link {link.name}: got "
+                    f"{differences[0]} the same mesh of the visual; expected the same pose and "
+                    "scale",
+                )
     yield from _resized_primitives(robot)
     yield from _turned_cylinders(robot)
 

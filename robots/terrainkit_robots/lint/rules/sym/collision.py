@@ -65,10 +65,7 @@ def collision_asymmetry(robot: Facts) -> Violations:
             continue
 
         def extent(body: Body) -> Matrix | None:
-            if body.joint is None:
-                return None
-            box = bounds(body.collisions, robot.meshes)
-            return None if box is None else box.ravel()
+            return None if body.joint is None else bounds(body.collisions, robot.meshes)
 
         odd, other, reason = robot.outlier_first(pair, extent, partial(_visual_offset, robot))
         yield Violation(

@@ -140,7 +140,7 @@ def product_asymmetry(robot: Facts) -> Violations:
         error = float(np.abs(reflection @ a @ reflection - b).max()) / largest
         if error <= _MAX_PRODUCT_ERROR or moments > _MAX_MOMENT_ERROR:
             continue
-        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia.ravel())
+        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia)
         yield Violation(
             element=inertia_part(odd.body.main_link),
             message=f"inertia of body {odd.body.name} in the axes of the trunk: got {error:.0%} "

@@ -138,7 +138,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         return body.joint.direction if body.joint else None
 
     def rotation(body: Body) -> Matrix:
-        return body.origin[:3, :3].ravel()
+        return body.origin[:3, :3]
 
     value = axis if error.is_axis else position if error.distance else rotation
 

@@ -1,6 +1,7 @@
 """Rules that compare position, velocity and effort limits."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -48,8 +49,7 @@ def compare_limits(robot: Facts) -> Violations:
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
             f"difference of at most {limit_tolerance(one)} {one.unit}",
         )
-    velocities = {one.name: (one.velocity, other.velocity) for one, other in pairs}
-    for (_, a, b), same in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
+    for (_, a, b), same in _grouped(pairs, partial(_difference, "velocity")):
         unit = same[0][0].units.velocity
         yield _report_group(
             same,
@@ -67,11 +67,12 @@ def _range_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
     return one.kind == "prismatic", a, b
 
 
-def _difference(joint: Joint, a: float | None, b: float | None) -> tuple[bool, float, float] | None:
+def _difference(name: str, one: Joint, other: Joint) -> tuple[bool, float, float] | None:
     """Return whether a joint slides, and its two limits if both are given and they differ."""
+    a, b = getattr(one, name), getattr(other, name)
     if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
         return None
-    return joint.kind == "prismatic", a, b
+    return one.kind == "prismatic", a, b
 
 
 def _format_range(joint: Joint) -> str:
@@ -118,13 +119,11 @@ def compare_effort(robot: Facts) -> Violations:
     """
     other, there = other_robot(robot), other_name(robot)
     pairs = matching_joints(robot)
-    efforts = {a.name: (a.effort, b.effort) for a, b in pairs}
 
-    def missing(one: Joint, _: Joint) -> bool | None:
-        a, b = map(bool, efforts[one.name])
-        return None if a == b else a
+    def missing(one: Joint, other: Joint) -> bool | None:
+        return None if bool(one.effort) == bool(other.effort) else bool(one.effort)
 
-    for (_, a, b), same in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
+    for (_, a, b), same in _grouped(pairs, partial(_difference, "effort")):
         unit = same[0][0].units.effort
         yield _report_group(
             same,
