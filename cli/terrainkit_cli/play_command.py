@@ -31,9 +31,6 @@ class Play(PolicyCommand):
     robots: int = 4
     """On a map, number of robots that the video follows in turn."""
 
-    height_points: bool = False
-    """Show the points of the height scan in the video."""
-
     size: Annotated[tuple[int, int], option("WIDTH HEIGHT")] = (640, 360)
     """Size of the video [pixels]."""
 
@@ -69,7 +66,6 @@ class Play(PolicyCommand):
                 config,
                 video=self.video,
                 robots=self.robots,
-                height_points=self.height_points,
                 size=self.size,
                 progress=lambda fraction: steps.update(
                     f"rollout: {fraction:.0%} of {self.seconds:g} s"

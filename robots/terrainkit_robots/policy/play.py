@@ -54,7 +54,6 @@ def play(
     *,
     video: bool = True,
     robots: int = DEFAULT_ROBOTS,
-    height_points: bool = False,
     size: tuple[int, int] = DEFAULT_SIZE,
     progress: Progress = lambda _: None,
 ) -> PlayResult:
@@ -69,7 +68,6 @@ def play(
         video: Whether to record a video. Without one, the rollout stops once every
             robot has fallen or crossed half a patch.
         robots: Number of robots that the video follows on a map.
-        height_points: Whether the video shows the points of the height scan.
         size: Width and height of the video [pixels].
         progress: Called after each step with the completed fraction, 0 to 1.
 
@@ -90,7 +88,7 @@ def play(
 
     evaluation = EvaluationRollout(env)
     evaluation.run(load_policy(spec, env), config.seconds, commands, update, stop_early=not video)
-    recorded = recorder.make_video(robots, size, scan=height_points) if video else None
+    recorded = recorder.make_video(robots, size) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
 
 
@@ -149,28 +147,23 @@ class PoseRecorder:
             self.commands.append(self.env.commands.copy())
         self.num_steps += 1
 
-    def make_video(self, robots: int, size: tuple[int, int], *, scan: bool = False) -> VideoSpec:
+    def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
         """Return a video of the formation on a plane, or of some robots in turn on a map.
 
-        A robot on a map is shown until it falls. `scan` shows the points of the height scan.
+        A robot on a map is shown until it falls.
         """
         env = self.env
         terrain = self.env.terrain
         poses = np.stack(self.poses)
         shots = []
         frames, n = poses.shape[:2]
-
-        def points(robot: int) -> FloatArray | None:
-            pos, quat = poses[:, robot, :3], poses[:, robot, 3:7]
-            return np.stack(env.sensors.scan_points(pos, quat), -1) if scan else None
-
         if terrain.is_plane:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, env.robot.base_height_target)
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
-            shots.append(Shot(robot=n // 2, captions=captions, points=points(n // 2)))
+            shots.append(Shot(robot=n // 2, captions=captions))
         tracked = select_tracked_robots(env, robots)
         rows = len(terrain.env_origins)
         for robot in tracked if not terrain.is_plane else ():
@@ -178,7 +171,7 @@ class PoseRecorder:
             caption = str(terrain.terrain_names[level, column])
             caption += f", level {level} of {rows - 1}" if rows > 1 else ""
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
-            shots.append(Shot(robot=robot, captions=(caption,) * stop, points=points(robot)))
+            shots.append(Shot(robot=robot, captions=(caption,) * stop))
         fps = 1 / (env.cfg.dt * self.stride)
         model = drawn_model(env.scene, env.robot, terrain, env.cfg)
         return VideoSpec(model=model, poses=poses, shots=tuple(shots), fps=fps, size=size)
