@@ -27,9 +27,9 @@ import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, get_args
 
 from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
@@ -213,6 +213,17 @@ Check = Callable[["Facts"], Violations | None]
 """A generator of violations. A function without code reports what the readers recorded."""
 
 
+class RulePage(NamedTuple):
+    """The documentation page of a rule."""
+
+    title: str
+    why: str
+    """The reason for the rule."""
+
+    how_to_fix: str
+    reference: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rule:
     """A rule and its documentation page."""
@@ -253,7 +264,7 @@ class Rule:
                 message=violation.message,
                 subject=element.name,
                 source=element.source,
-                hint=violation.hint or self.how_to_fix,
+                hint=violation.hint or self.page.how_to_fix,
                 severity=violation.severity or self.severity,
                 certainty=violation.certainty or self.certainty,
                 measured=violation.measured,
@@ -280,28 +291,13 @@ class Rule:
         """Return the letters of the code."""
         return self.code[:3]
 
-    @property
-    def title(self) -> str:
-        """Return the first line of the page."""
-        return self._page[0]
+    @cached_property
+    def page(self) -> RulePage:
+        """The parts of the docstring.
 
-    @property
-    def why(self) -> str:
-        """Return the reason for the rule."""
-        return self._page[1]
-
-    @property
-    def how_to_fix(self) -> str:
-        """Return the `Fix:` section of the page."""
-        return self._page[2]
-
-    @property
-    def reference(self) -> str:
-        """Return the `Source:` section of the page."""
-        return self._page[3]
-
-    @property
-    def _page(self) -> tuple[str, str, str, str]:
+        Raises:
+            ConfigError: if one is missing.
+        """
         match = re.fullmatch(
             r"(?P<title>[^\n]+)\n\n(?P<why>.+?)\n\nFix:\n(?P<fix>.+?)\n\nSource:\n(?P<source>.+)",
             inspect.getdoc(self.check) or "",
@@ -312,7 +308,7 @@ class Rule:
                 f"docstring of rule {self.code}: expected a title, a reason, Fix: and Source:"
             )
         why = "\n\n".join(one_line(paragraph) for paragraph in match["why"].split("\n\n"))
-        return match["title"], why, one_line(match["fix"]), one_line(match["source"])
+        return RulePage(match["title"], why, one_line(match["fix"]), one_line(match["source"]))
 
 
 def _need_order(need: Need) -> int:

@@ -51,14 +51,8 @@ class FixResult:
     new: Mapping[Path, bytes]
     """Contents of the files to create."""
 
-    fixed: tuple[Finding, ...]
-    """Findings that no longer occur."""
-
-    unfixed: tuple[tuple[Finding, str], ...]
-    """Findings that have a fix and still occur, and the reasons."""
-
     report: Report
-    """The report on the fixed robot."""
+    """The report on the fixed robot, with the findings that were fixed and those that were not."""
 
 
 def fix_robot(
@@ -93,13 +87,15 @@ def fix_robot(
         before={files.path[p]: files.original[p] for p in changed},
         after={files.path[p]: files.current[p] for p in changed},
         new={files.path[p]: files.current[p] for p in created},
-        fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
-        unfixed=tuple(
-            (f, reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
-            for f in report.findings
-            if f.fix is not None
+        report=replace(
+            report,
+            fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
+            unfixed=tuple(
+                (f, reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
+                for f in report.findings
+                if f.fix is not None and (unsafe or f.fix.safety == "safe")
+            ),
         ),
-        report=report,
     )
 
 
@@ -167,11 +163,9 @@ def _apply_round(
     done: list[Finding] = []
     reasons: dict[_Key, str] = {}
     for finding in report.findings:
-        if finding.fix is None:
+        if finding.fix is None or not (unsafe or finding.fix.safety == "safe"):
             continue
         try:
-            if finding.fix.safety != "safe" and not unsafe:
-                raise EditError("the fix is unsafe, because it changes the robot")
             # A fix that is found again after it was applied would be applied in every round.
             if not inserted.isdisjoint(_insertions(finding)):
                 raise EditError("the fix was applied without effect")

@@ -149,14 +149,14 @@ class _Text:
         """
         if source.element is None:
             raise EditError("the element cannot be edited: its file is generated or malformed")
-        count = len(self._index[0])
+        count = len(self._positions[0])
         if not 0 <= source.element < count:
             raise EditError(f"element index: got {source.element}; expected less than {count}")
         return self._element(source.element)
 
     def child(self, parent: _Element) -> _Element | None:
         """Return the first child of an element."""
-        index, starts = parent.index + 1, self._index[0]
+        index, starts = parent.index + 1, self._positions[0]
         inside = index < len(starts) and starts[index] < parent.close
         return self._element(index) if inside else None
 
@@ -190,7 +190,7 @@ class _Text:
         return text.encode(self._positions[2], "xmlcharrefreplace")
 
     def _element(self, index: int) -> _Element:
-        start, close = self._index[0][index], self._index[1][index]
+        start, close = self._positions[0][index], self._positions[1][index]
         tag = _START_TAG.match(self.data, start)
         if tag is None:
             raise EditError("the encoding of the file is not supported; expected UTF-8")
@@ -207,10 +207,6 @@ class _Text:
             close=tag.end() if is_empty_tag else close,
             end=tag.end() if is_empty_tag or end_tag is None else end_tag.end(),
         )
-
-    @property
-    def _index(self) -> tuple[Sequence[int], Sequence[int]]:
-        return self._positions[0], self._positions[1]
 
     @cached_property
     def _positions(self) -> tuple[Sequence[int], Sequence[int], str]:

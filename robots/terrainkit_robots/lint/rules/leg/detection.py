@@ -82,19 +82,20 @@ def leg_count(robot: Facts) -> Violations:
     """
     count = len(robot.legs)
     uncounted = _uncounted_legs(robot)
+    measured = {"legs": count}
+    expected = "2, 4, 6 or 8"
     if uncounted:
-        yield Violation(
-            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
-            f"expected {count + len(uncounted)}, since {names(uncounted)} have the joints and "
-            "masses of a leg, but do not end near the ground; check that z points up",
-            measured={"legs": count, "uncounted": len(uncounted)},
+        measured["uncounted"] = len(uncounted)
+        expected = (
+            f"{count + len(uncounted)}, since {names(uncounted)} have the joints and masses of a "
+            "leg, but do not end near the ground; check that z points up"
         )
-    elif len(robot.limbs) > 1 and count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
-        yield Violation(
-            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
-            "expected 2, 4, 6 or 8",
-            measured={"legs": count},
-        )
+    elif len(robot.limbs) <= 1 or count + len(_inverted_legs(robot)) in _LEG_COUNTS:
+        return
+    feet = ", ".join(leg.foot for leg in robot.legs)
+    yield Violation(
+        message=f"number of legs: got {count} ({feet}); expected {expected}", measured=measured
+    )
 
 
 def _uncounted_legs(robot: Facts) -> list[str]:
