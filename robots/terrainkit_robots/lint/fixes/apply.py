@@ -267,17 +267,13 @@ class _Batch:
         if existing is None:
             if not os.path.lexists(path):
                 return True
-            existing = path.read_bytes() if _is_regular(path, len(data)) else None
+            status = path.stat(follow_symlinks=False)
+            is_same_size = stat.S_ISREG(status.st_mode) and status.st_size == len(data)
+            existing = path.read_bytes() if is_same_size else None
         if existing != data:
             name = display_path(self._files.path[path])
             raise EditError(f"{name} exists with different content")
         return False
-
-
-def _is_regular(path: Path, size: int) -> bool:
-    """Return whether the path is a regular file of this size."""
-    status = path.stat(follow_symlinks=False)
-    return stat.S_ISREG(status.st_mode) and status.st_size == size
 
 
 def write_fixes(result: FixResult) -> None:

@@ -42,13 +42,10 @@ def massless_body(robot: Facts) -> Violations:
     """
     for link in robot.model.links:
         inertial = link.inertial
-        if (
-            inertial
-            and inertial.mass is None
-            and not robot.unparsed.has(link.name, "value", "mass")
-        ):
+        has_no_mass = inertial is not None and inertial.mass is None
+        if has_no_mass and not robot.unparsed.has(link.name, "value", "mass"):
             yield Violation(
-                element=Part(link.name, inertial.source),
+                element=mass_part(link),
                 message=f"<inertial> of link {link.name}: got no <mass>; expected <mass> and "
                 "<inertia>",
             )

@@ -44,16 +44,13 @@ def missing_actuator(robot: Facts) -> Violations:
         return
     for joint in robot.robot_joints:
         if joint.name not in actuated and joint.mimic is None and not joint.coupled:
-            reason = robot.passive_joints.get(joint.name)
+            expected = "expected 1"
+            if robot.passive_joints.get(joint.name) == OPEN_LINKAGE:
+                expected = f"{OPEN_LINKAGE}; expected an <equality> that closes the loop"
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",
-                message=f"actuators of joint {joint.name}: got 0"
-                + (
-                    f"; {reason}; expected an <equality> that closes the loop"
-                    if reason == OPEN_LINKAGE
-                    else "; expected 1"
-                ),
+                message=f"actuators of joint {joint.name}: got 0; {expected}",
             )
 
 

@@ -99,10 +99,8 @@ def merged_feet(robot: Facts) -> Violations:
     verb = "merges" if len(by) == 1 else "merge"
     yield Violation(
         element=Part(foot, robot.tree.parent_joint[foot].source),
-        message=(
-            f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
-            f"({foot} into {next(iter(bodies.values()))}{more})"
-        ),
+        message=f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
+        f"({foot} into {next(iter(bodies.values()))}{more})",
         hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
     )
