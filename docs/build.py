@@ -238,7 +238,7 @@ def rules_page() -> str:
             if rule.family == family:
                 link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
                 severity, fix = rule.severity, FIXED[rule.fixes]
-                parts.append(f"| {link} | {markup(rule.title)} | {severity} | {fix} |")
+                parts.append(f"| {link} | {markup(rule.page.title)} | {severity} | {fix} |")
         parts += ["", *(rule_section(rule) for rule in rules() if rule.family == family)]
     return "\n".join(parts)
 
@@ -262,10 +262,10 @@ def rule_section(rule: Rule) -> str:
     fixed = f"; fixed by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
     return (
         f"### {rule.code} {rule.name}\n\n"
-        f"**{markup(rule.title)}** Severity: {rule.severity}{fixed}.\n\n"
-        f"{markup(rule.why)}\n\n"
-        f"*How to fix:* {markup(rule.how_to_fix)}\n\n"
-        f"*Source:* {markup(rule.reference)}\n"
+        f"**{markup(rule.page.title)}** Severity: {rule.severity}{fixed}.\n\n"
+        f"{markup(rule.page.why)}\n\n"
+        f"*How to fix:* {markup(rule.page.how_to_fix)}\n\n"
+        f"*Source:* {markup(rule.page.reference)}\n"
     )
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath
 from terrainkit_cli.evaluate_command import PolicyCommand, gait_lines, result_rows, summary_line
@@ -32,26 +31,18 @@ class Play(PolicyCommand):
     robots: int = 4
     """On a map, number of robots that the video follows in turn."""
 
-    height_points: bool = False
-    """Show the points of the height scan in the video."""
-
     size: Annotated[tuple[int, int], option("WIDTH HEIGHT")] = (640, 360)
     """Size of the video [pixels]."""
 
     video: bool = True
     """Write a video; --no-video only prints the table."""
 
-    viewer: bool = False
-    """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""
-
     overwrite: bool = False
     """Replace an existing video."""
 
     def run(self) -> int:
         """Roll out the policy, print the table, and write the video."""
-        if self.viewer and (self.output or not self.video):
-            raise ConfigError("--viewer: got --output or --no-video too; expected it alone")
-        if self.video and not self.viewer:
+        if self.video:
             require_training("imageio_ffmpeg")  # before the rollout
         spec = self.load_spec()
         from terrainkit_robots.rl.run import Run
@@ -63,12 +54,9 @@ class Play(PolicyCommand):
             named = self.policy.stem
         target = self.output or Path(f"{named}.mp4")
         config = self.eval_config(self.seconds)
-        from terrainkit_robots.policy.play import play, view
+        from terrainkit_robots.policy.play import play
         from terrainkit_robots.rendering.video import check_video_path, check_video_size
 
-        if self.viewer:
-            view(spec, config)
-            return 0
         if self.video:
             check_video_size(self.size)
             check_video_path(target, overwrite=self.overwrite)  # before the rollout
@@ -78,7 +66,6 @@ class Play(PolicyCommand):
                 config,
                 video=self.video,
                 robots=self.robots,
-                height_points=self.height_points,
                 size=self.size,
                 progress=lambda fraction: steps.update(
                     f"rollout: {fraction:.0%} of {self.seconds:g} s"

@@ -24,7 +24,6 @@ from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.baseline import Baseline
-    from terrainkit_robots.lint.fixes.apply import FixResult
     from terrainkit_robots.lint.rule import Rule as RobotRule
     from terrainkit_robots.lint.runner import Report
     from terrainkit_robots.lint.settings import Settings
@@ -217,7 +216,7 @@ class CheckRobot(Command):
             diff = ""
         path = report.facts.model.file
         if self.fix or self.unsafe_fixes or self.diff:
-            from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
+            from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff, write_fixes
 
             if not self.diff and (bundled.is_bundled(path) or path != Path(name)):
                 raise ConfigError(
@@ -229,7 +228,8 @@ class CheckRobot(Command):
             if self.diff:
                 diff = unified_diff(result)
             else:
-                report = _write_fixes(result, unsafe=self.unsafe_fixes)
+                write_fixes(result)
+                report = result.report
         return _FileResult(report=report, strict=bool(settings.strict), diff=diff)
 
     def _print(self, reports: "Sequence[Report]", diff: str) -> None:
@@ -288,20 +288,6 @@ def _is_folder(name: str) -> bool:
     return name not in ("", *bundled.robot_names()) and is_folder(Path(name))
 
 
-def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
-    """Write the fixed files, and return the report with the fixed findings."""
-    from terrainkit_robots.lint.fixes.apply import write_fixes
-
-    write_fixes(result)
-    safeties = ("safe", "unsafe") if unsafe else ("safe",)
-    unfixed = tuple(
-        (left.finding, left.reason)
-        for left in result.unfixed
-        if left.finding.fix is not None and left.finding.fix.safety in safeties
-    )
-    return replace(result.report, fixed=result.fixed, unfixed=unfixed)
-
-
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     """Raise an error if the report cannot be written, or would replace a checked file."""
     from terrainkit.files.atomic_write import check_target
@@ -336,7 +322,7 @@ class Rule(Command):
             members = [rule for rule in rules() if rule.family == name]
             render.table(
                 [
-                    (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.title)
+                    (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.page.title)
                     for r in members
                 ]
             )
@@ -353,11 +339,12 @@ def _rule_page(rule: "RobotRule") -> str:
     from terrainkit_robots.lint.rule import families
 
     fixes = f"; fixed by {_FIX_OPTIONS[rule.fixes]}" if rule.fixes != "no" else ""
+    title, why, how_to_fix, reference = rule.page
     paragraphs = [
         f"{rule.code} {rule.name} ({rule.severity}{fixes}), {families()[rule.family].title}",
-        rule.title,
-        *rule.why.split("\n\n"),
-        f"Fix: {rule.how_to_fix}",
-        f"Source: {rule.reference}",
+        title,
+        *why.split("\n\n"),
+        f"Fix: {how_to_fix}",
+        f"Source: {reference}",
     ]
     return "\n\n".join(textwrap.fill(paragraph, 88) for paragraph in paragraphs)

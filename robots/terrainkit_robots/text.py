@@ -1,11 +1,23 @@
-"""Format names, counts and paths for messages."""
+"""Group values for messages, and format names, counts and paths."""
 
 import os
 import re
 from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from terrainkit.settings.text import truncate
+
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
+
+
+def group(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
+    """Return the values by key, both in the order in which they come."""
+    groups: dict[_Key, list[_Value]] = {}
+    for key, value in pairs:
+        groups.setdefault(key, []).append(value)
+    return groups
 
 
 def names(items: Iterable[str], max_count: int = 6, sep: str = ", ") -> str:

@@ -89,11 +89,3 @@ def test_play_checks_the_target_first(rejected, tmp_path, monkeypatch):
 @pytest.mark.usefixtures("walking")
 def test_play_rejects_invalid_input(rejected, words, message):
     assert message in rejected(f"play {words}")
-
-
-@pytest.mark.usefixtures("walking")
-def test_play_viewer_requires_a_display(rejected, monkeypatch):
-    monkeypatch.setattr(play.sys, "platform", "linux")
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    assert "viewer: got no DISPLAY or WAYLAND_DISPLAY" in rejected("play walk --viewer")

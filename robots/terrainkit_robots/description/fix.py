@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +19,16 @@ class Source:
     element: int | None = None
     """Index of the element in the file, in document order. None if the element cannot be edited,
     because the file is malformed or was expanded from xacro."""
+
+
+class Part(NamedTuple):
+    """A part of an element, such as the limit of a joint: what it is called, and where it is."""
+
+    name: str
+    """Name of the element."""
+
+    source: Source
+    """Location of the part."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +57,11 @@ class RemoveElement:
 
 @dataclass(frozen=True, kw_only=True)
 class InsertChild:
-    """Insert an element as the first or last child of another."""
+    """Insert an element as the first child of another, which has children."""
 
     source: Source
     xml: str
     """The element on one line, without indentation."""
-
-    first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,22 @@ JOINT_TYPES = MOVING | {"fixed", "floating", "planar", "ball"}
 
 
 @dataclass(frozen=True, kw_only=True)
+class JointUnits:
+    """Units of the quantities of a joint."""
+
+    position: str
+    velocity: str
+    effort: str
+    """Unit of the torque or force."""
+
+    inertia: str
+
+
+REVOLUTE = JointUnits(position="rad", velocity="rad/s", effort="N m", inertia="kg m2")
+PRISMATIC = JointUnits(position="m", velocity="m/s", effort="N", inertia="kg")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Problem:
     """Something that could not be read. The lint rule with the same code reports it."""
 
@@ -417,19 +433,14 @@ class Joint:
         return self.kind in MOVING
 
     @property
+    def units(self) -> JointUnits:
+        """Return the units of its quantities."""
+        return PRISMATIC if self.kind == "prismatic" else REVOLUTE
+
+    @property
     def unit(self) -> str:
-        """Return the unit of the joint position."""
-        return "m" if self.kind == "prismatic" else "rad"
-
-    @property
-    def effort_unit(self) -> str:
-        """Return the unit of the joint effort."""
-        return "N" if self.kind == "prismatic" else "N m"
-
-    @property
-    def speed_unit(self) -> str:
-        """Return the unit of the joint velocity."""
-        return "m/s" if self.kind == "prismatic" else "rad/s"
+        """Return the unit of its position."""
+        return self.units.position
 
     @property
     def range(self) -> tuple[float, float] | None:

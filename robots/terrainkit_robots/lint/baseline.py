@@ -29,7 +29,7 @@ from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
-from terrainkit_robots.text import count, display_path, names
+from terrainkit_robots.text import count, display_path, group, names
 
 Entries = Mapping[str, Sequence[str]]
 """Subjects of the accepted findings of a robot, by code of the rule."""
@@ -86,7 +86,7 @@ class Baseline:
         for report in reports:
             key = self._key(report)
             entries = {c: v for c, v in robots.get(key, {}).items() if c not in report.completed}
-            entries |= _group(_counts(report).elements())
+            entries |= group(sorted(_counts(report).elements()))
             robots[key] = dict(sorted(entries.items()))
         return replace(self, robots={key: robots[key] for key in sorted(robots) if robots[key]})
 
@@ -110,7 +110,7 @@ class Baseline:
                 )
             else:
                 kept.append(finding)
-        unused = _group(key for key in recorded - found if key[0] in report.completed)
+        unused = group(sorted(key for key in recorded - found if key[0] in report.completed))
         for code, subjects in unused.items():
             reason = f"no longer needed in {file}: {names(subjects)}"
             skipped.append(Skipped(code=code, kind="unused", reason=reason))
@@ -124,14 +124,6 @@ class Baseline:
         except ValueError:  # on another drive of Windows
             relative = str(file)
         return Path(relative).as_posix()
-
-
-def _group(keys: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the subjects by code, sorted."""
-    groups: dict[str, list[str]] = {}
-    for code, subject in sorted(keys):
-        groups.setdefault(code, []).append(subject)
-    return groups
 
 
 def _counts(report: Report) -> Counter[tuple[str, str]]:

@@ -12,7 +12,7 @@ from terrainkit_robots.lint.runner import Report, Skipped, has_inputs, lint
 from terrainkit_robots.lint.settings import Settings, matching, read_settings
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.text import display_path, names
+from terrainkit_robots.text import display_path, group, names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,10 +85,7 @@ def _apply_suppressions(
     report: Report, comments: Sequence[SuppressionComment]
 ) -> tuple[list[Finding], list[Suppressed]]:
     """Split the findings of a report into remaining and suppressed findings."""
-    by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
-    for suppression in comments:
-        if suppression.error is None:
-            by_rule.setdefault((suppression.file, suppression.code), []).append(suppression)
+    by_rule = group(((c.file, c.code), c) for c in comments if c.error is None)
     kept: list[Finding] = []
     suppressed: list[Suppressed] = []
     for finding in report.findings:

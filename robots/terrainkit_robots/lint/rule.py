@@ -27,14 +27,14 @@ import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, get_args
 
 from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
-from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.description.model import Source
+from terrainkit_robots.description.fix import Fix, Source
+from terrainkit_robots.description.fix import Part as Part
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -142,13 +142,7 @@ class Violation:
     """One sentence with the measured value, its unit and the threshold."""
 
     element: Element | None = None
-    """What violates the rule, such as a link or a joint. By default, the robot."""
-
-    subject: str | None = None
-    """Name of the link, joint, mesh or file. By default, the name of the element."""
-
-    source: Source | None = None
-    """File and line. By default, file and line of the element."""
+    """What violates the rule, such as a link, a joint or a part of it. By default, the robot."""
 
     hint: str = ""
     """How to correct it. By default, the `Fix:` section of the rule."""
@@ -181,7 +175,11 @@ class Finding(Violation):
     """Name of the rule, such as `negative-mass`."""
 
     subject: str
+    """Name of the element."""
+
     source: Source
+    """File and line."""
+
     severity: Severity
     certainty: Certainty
     onboarding: Onboarding = "reports"
@@ -213,6 +211,17 @@ Violations = Iterator[Violation]
 
 Check = Callable[["Facts"], Violations | None]
 """A generator of violations. A function without code reports what the readers recorded."""
+
+
+class RulePage(NamedTuple):
+    """The documentation page of a rule."""
+
+    title: str
+    why: str
+    """The reason for the rule."""
+
+    how_to_fix: str
+    reference: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,16 +257,14 @@ class Rule:
     def findings(self, robot: "Facts") -> Iterator[Finding]:
         """Yield the violations on a robot with their defaults filled in."""
         for violation in self._violations(robot):
-            element, subject = violation.element, violation.subject
-            if subject is None:
-                subject = robot.model.title if element is None else element.name
+            element = violation.element or Part(robot.model.title, robot.model.source)
             yield Finding(
                 code=self.code,
                 name=self.name,
                 message=violation.message,
-                subject=subject,
-                source=violation.source or (element or robot.model).source,
-                hint=violation.hint or self.how_to_fix,
+                subject=element.name,
+                source=element.source,
+                hint=violation.hint or self.page.how_to_fix,
                 severity=violation.severity or self.severity,
                 certainty=violation.certainty or self.certainty,
                 measured=violation.measured,
@@ -270,9 +277,9 @@ class Rule:
         """Yield what the readers recorded under the code, then what the check finds."""
         for problem in robot.model.problems:
             if problem.code == self.code:
+                subject = problem.subject or robot.model.name or problem.source.file.name
                 yield Violation(
-                    subject=problem.subject or robot.model.name or problem.source.file.name,
-                    source=problem.source,
+                    element=Part(subject, problem.source),
                     message=problem.message,
                     severity=problem.severity,
                     fix=problem.fix,
@@ -284,28 +291,13 @@ class Rule:
         """Return the letters of the code."""
         return self.code[:3]
 
-    @property
-    def title(self) -> str:
-        """Return the first line of the page."""
-        return self._page[0]
+    @cached_property
+    def page(self) -> RulePage:
+        """The parts of the docstring.
 
-    @property
-    def why(self) -> str:
-        """Return the reason for the rule."""
-        return self._page[1]
-
-    @property
-    def how_to_fix(self) -> str:
-        """Return the `Fix:` section of the page."""
-        return self._page[2]
-
-    @property
-    def reference(self) -> str:
-        """Return the `Source:` section of the page."""
-        return self._page[3]
-
-    @property
-    def _page(self) -> tuple[str, str, str, str]:
+        Raises:
+            ConfigError: if one is missing.
+        """
         match = re.fullmatch(
             r"(?P<title>[^\n]+)\n\n(?P<why>.+?)\n\nFix:\n(?P<fix>.+?)\n\nSource:\n(?P<source>.+)",
             inspect.getdoc(self.check) or "",
@@ -316,7 +308,7 @@ class Rule:
                 f"docstring of rule {self.code}: expected a title, a reason, Fix: and Source:"
             )
         why = "\n\n".join(one_line(paragraph) for paragraph in match["why"].split("\n\n"))
-        return match["title"], why, one_line(match["fix"]), one_line(match["source"])
+        return RulePage(match["title"], why, one_line(match["fix"]), one_line(match["source"]))
 
 
 def _need_order(need: Need) -> int:

@@ -40,13 +40,13 @@ def check_and_repair(
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
         result = fix_robot(path, check, report=report, unsafe=unsafe)
-        report, fixed = result.report, result.fixed
+        report, fixed = result.report, result.report.fixed
     # The export rewrites these parts. The fix of the lint rule is not applied, so its description
     # is removed.
     converted = [f for f in report.findings if f.severity == "error" and f.onboarding == "converts"]
     remaining = tuple(finding for finding in report.findings if finding not in converted)
     fixed += tuple(replace(finding, fix=None) for finding in converted)
-    return replace(report, findings=remaining), fixed
+    return replace(report, findings=remaining, fixed=(), unfixed=()), fixed
 
 
 def _with_safe_fix(report: Report, finding: Finding) -> Finding:

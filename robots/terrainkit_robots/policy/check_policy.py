@@ -187,10 +187,8 @@ def _asymmetries(
     is_signed = name in ("default_pose", "action_offset")
     for joint, mirror in robot.spec.mirror.items():
         if mirror.joint in by_joint and joint in by_joint and joint <= mirror.joint:
-            got, expected = (
-                by_joint[joint],
-                by_joint[mirror.joint] * (mirror.sign if is_signed else 1),
-            )
+            got = by_joint[joint]
+            expected = by_joint[mirror.joint] * (mirror.sign if is_signed else 1)
             if abs(got - expected) > 0.05 * max(abs(got), abs(expected), 0.2):
                 text = f"{name} of {joint} {got:g}, of its mirror image {by_joint[mirror.joint]:g}"
                 hint = "check the order of the joints, and their signs"

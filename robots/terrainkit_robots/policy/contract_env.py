@@ -148,10 +148,8 @@ def _table(
     blocks = []
     ids = [joints.index(joint) for joint in contract.joints]
     for term in contract.terms:
-        own, source = (
-            own_name(contract.style, term.name, [*widths]),
-            _source(contract, term, [*widths]),
-        )
+        own = own_name(contract.style, term.name, [*widths])
+        source = _source(contract, term, [*widths])
         index = starts[source] + np.arange(widths[source])
         if source in ("dof_pos", "dof_vel"):
             index = index[ids]

@@ -71,8 +71,8 @@ def open_policy(
         return _open_description(found, path, model, task)
     with prefixed_errors(f"{found.source}: "):
         parsed = read_contract(found, model)
-        for got, expected in parsed.doubts:
-            message = f"{found.source}: {got}, so expected {expected}"
+        for doubt in parsed.doubts:
+            message = f"{found.source}: {doubt.got}, so expected {doubt.expected}"
             warnings.warn(message, TerrainkitWarning, stacklevel=2)
         return make_spec(parsed, found.policy, model, task)
 

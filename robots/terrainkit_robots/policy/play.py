@@ -1,10 +1,7 @@
-"""Play a policy: measure it as an evaluation does, and record a video or open a viewer."""
+"""Play a policy: measure it as an evaluation does, and record a video."""
 
-import os
-import sys
-import time
 from dataclasses import dataclass, replace
-from itertools import cycle, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 
@@ -20,8 +17,6 @@ from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.policy_rollout import (
     EvaluationRollout,
     Progress,
-    command_schedule,
-    rollout,
 )
 from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
@@ -59,7 +54,6 @@ def play(
     *,
     video: bool = True,
     robots: int = DEFAULT_ROBOTS,
-    height_points: bool = False,
     size: tuple[int, int] = DEFAULT_SIZE,
     progress: Progress = lambda _: None,
 ) -> PlayResult:
@@ -74,7 +68,6 @@ def play(
         video: Whether to record a video. Without one, the rollout stops once every
             robot has fallen or crossed half a patch.
         robots: Number of robots that the video follows on a map.
-        height_points: Whether the video shows the points of the height scan.
         size: Width and height of the video [pixels].
         progress: Called after each step with the completed fraction, 0 to 1.
 
@@ -95,43 +88,8 @@ def play(
 
     evaluation = EvaluationRollout(env)
     evaluation.run(load_policy(spec, env), config.seconds, commands, update, stop_early=not video)
-    recorded = recorder.make_video(robots, size, scan=height_points) if video else None
+    recorded = recorder.make_video(robots, size) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
-
-
-@single_torch_thread()
-def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
-    """Show one robot in MuJoCo's viewer in real time, until its window is closed.
-
-    Raises:
-        ConfigError: If there is no display, or a run has no policy, or its policy is for another
-            robot.
-    """
-    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
-        raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
-    import mujoco.viewer
-
-    config = replace(config or EvaluationConfig(), num_envs=1)
-    env, commands = make_play_env(spec, config)
-    model = drawn_model(env.scene, env.robot, env.terrain, env.cfg)
-    data = mujoco.MjData(model)
-    schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
-    steps = rollout(env, load_policy(spec, env), cycle(schedule))
-    try:
-        viewer = mujoco.viewer.launch_passive(model, data)
-    except RuntimeError as error:  # macOS needs mjpython
-        raise ConfigError(f"cannot open MuJoCo's viewer: {error}") from None
-    with viewer:
-        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        viewer.cam.trackbodyid = env.scene.base
-        while viewer.is_running():
-            start = time.monotonic()
-            next(steps)
-            with viewer.lock():
-                data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
-                mujoco.mj_forward(model, data)
-            viewer.sync()
-            time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
 
 
 def make_play_env(
@@ -189,28 +147,23 @@ class PoseRecorder:
             self.commands.append(self.env.commands.copy())
         self.num_steps += 1
 
-    def make_video(self, robots: int, size: tuple[int, int], *, scan: bool = False) -> VideoSpec:
+    def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
         """Return a video of the formation on a plane, or of some robots in turn on a map.
 
-        A robot on a map is shown until it falls. `scan` shows the points of the height scan.
+        A robot on a map is shown until it falls.
         """
         env = self.env
         terrain = self.env.terrain
         poses = np.stack(self.poses)
         shots = []
         frames, n = poses.shape[:2]
-
-        def points(robot: int) -> FloatArray | None:
-            pos, quat = poses[:, robot, :3], poses[:, robot, 3:7]
-            return np.stack(env.sensors.scan_points(pos, quat), -1) if scan else None
-
         if terrain.is_plane:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, env.robot.base_height_target)
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
-            shots.append(Shot(robot=n // 2, captions=captions, points=points(n // 2)))
+            shots.append(Shot(robot=n // 2, captions=captions))
         tracked = select_tracked_robots(env, robots)
         rows = len(terrain.env_origins)
         for robot in tracked if not terrain.is_plane else ():
@@ -218,7 +171,7 @@ class PoseRecorder:
             caption = str(terrain.terrain_names[level, column])
             caption += f", level {level} of {rows - 1}" if rows > 1 else ""
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
-            shots.append(Shot(robot=robot, captions=(caption,) * stop, points=points(robot)))
+            shots.append(Shot(robot=robot, captions=(caption,) * stop))
         fps = 1 / (env.cfg.dt * self.stride)
         model = drawn_model(env.scene, env.robot, terrain, env.cfg)
         return VideoSpec(model=model, poses=poses, shots=tuple(shots), fps=fps, size=size)

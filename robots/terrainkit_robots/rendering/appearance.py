@@ -11,9 +11,6 @@ FIELD_OF_VIEW = 30.0  # vertical [deg]
 FOG_START, FOG_END = 2.0, 5.5  # distances from the camera, in extents of the model
 VISIBLE_GROUPS = (0, 1, 2)  # geom groups that MuJoCo shows by default
 
-POINT_RADIUS, POINT_RGBA = 0.015, np.array([1, 0.8, 0, 1], np.float32)
-"""Radius [m] and color of drawn points."""
-
 
 def set_appearance(spec: Any) -> None:
     """Set the lights, the sky and the visual options of a `mujoco.MjSpec`."""
@@ -90,19 +87,3 @@ def add_caption(frame: NDArray[np.uint8], text: str, scale: float) -> None:
     outline = [(i, j, (238, 242, 247)) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     for dx, dy, color in (*outline, (0, 0, (50, 60, 70))):
         cv2.putText(frame, text, (x + dx, y + dy), *style, color, 1, cv2.LINE_AA)
-
-
-def add_points(scene: Any, points: NDArray[np.floating[Any]]) -> None:
-    """Add points to a scene as spheres, as far as it has room.
-
-    Args:
-        scene: The `mujoco.MjvScene`.
-        points: Positions [m], shape (k, 3).
-    """
-    import mujoco
-
-    for point in points[: scene.maxgeom - scene.ngeom]:
-        geom = scene.geoms[scene.ngeom]
-        sphere, size = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, POINT_RADIUS)
-        mujoco.mjv_initGeom(geom, sphere, size, point.astype(float), np.eye(3).ravel(), POINT_RGBA)
-        scene.ngeom += 1

@@ -1,6 +1,6 @@
 """Render frames in a child process, since a broken OpenGL library may crash or block a process."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -54,29 +54,21 @@ def _stream_frames(
     """Yield the frames of the first process whose backend works, by name of the backend."""
     reasons: list[str] = []
     for backend, start in processes.items():
-        reason = yield from _run_child(start(), inputs)
-        if not reason:
-            return
-        reasons.append(f"{backend or 'default backend'}: {truncate(reason, 160)}")
-    advice = gl_backend.installation_advice()
-    raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
-
-
-def _run_child(child: ChildProcess, inputs: Iterator[Any] | None) -> Generator[Frame, None, str]:
-    """Yield frames, and return why the backend failed, or an empty string."""
-    count = 0
-    with child:
+        count = 0
         try:
-            while answer := _next_answer(child, inputs):
-                if "error" in answer:
-                    raise RenderError(str(answer["error"]))
-                yield answer["frame"]
-                count += 1
+            with start() as child:
+                while answer := _next_answer(child, inputs):
+                    if "error" in answer:
+                        raise RenderError(str(answer["error"]))
+                    yield answer["frame"]
+                    count += 1
+            return
         except ProcessError as error:
             if count:  # another backend would start again with the first frame
                 raise RenderError(f"rendering failed after {count} frames: {error}") from None
-            return str(error)
-    return ""
+            reasons.append(f"{backend or 'default backend'}: {truncate(str(error), 160)}")
+    advice = gl_backend.installation_advice()
+    raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
 
 
 def _next_answer(child: ChildProcess, inputs: Iterator[Any] | None) -> dict[str, NDArray[Any]]:

@@ -28,7 +28,6 @@ class Shot:
 
     robot: int  # index of the robot
     captions: tuple[str, ...]  # text at the bottom of each frame
-    points: NDArray[np.float32] | None = None  # to draw [m], shape (frames, k, 3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -182,8 +181,6 @@ def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame
                 other_data.qpos[:] = poses[k, robot]
                 mujoco.mj_kinematics(model, other_data)
                 mujoco.mjv_addGeoms(model, other_data, options, unchanged, moving, renderer.scene)
-            if shot.points is not None:
-                appearance.add_points(renderer.scene, shot.points[k])
             frame = renderer.render()
             appearance.add_caption(frame, caption, spec.size[1] / 750)
             yield frame

@@ -198,10 +198,8 @@ def measure_limits(
         counts = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
         is_open, all_cross = failed - passed > 1, counts == repetitions
         passed = np.where(is_open & all_cross, levels, passed)
-        failed, crossed = (
-            np.where(is_open & ~all_cross, new, old)
-            for new, old in ((levels, failed), (counts, crossed))
-        )
+        failed = np.where(is_open & ~all_cross, levels, failed)
+        crossed = np.where(is_open & ~all_cross, counts, crossed)
         progress((number + 1) / rounds)
     grid = terrain_map.config.patch_grid(0, 0)
     results = []

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit_robots.description.model import JointUnits
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.joint_units import JointUnits
 from terrainkit_robots.simulation.rollout import Rollout
 from terrainkit_robots.simulation.sim_model import SimModel
 
@@ -140,12 +140,7 @@ def _mimic_joints(model: Any) -> list[tuple[int, int, Any]]:
     """Return the qpos addresses of mimic joints and their targets, and the coefficients."""
     import mujoco
 
-    return [
-        (
-            int(model.jnt_qposadr[model.eq_obj1id[k]]),
-            int(model.jnt_qposadr[model.eq_obj2id[k]]),
-            model.eq_data[k, :5].copy(),
-        )
-        for k in range(model.neq)
-        if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj2id[k] >= 0
-    ]
+    is_mimic = (model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj2id >= 0)
+    joints, targets = model.eq_obj1id[is_mimic], model.eq_obj2id[is_mimic]
+    addresses = model.jnt_qposadr[joints], model.jnt_qposadr[targets]
+    return list(zip(*addresses, model.eq_data[is_mimic, :5], strict=True))

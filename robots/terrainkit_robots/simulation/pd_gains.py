@@ -23,7 +23,7 @@ from terrainkit_robots.simulation.stiffness import GainTarget, leg_gain_target, 
 from terrainkit_robots.simulation.time_step import JointInertia, joint_inertia
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.joint_units import JointUnits
+    from terrainkit_robots.description.model import JointUnits
 
 _MIN_STIFFNESS_RATIO = 20.0
 """Stiffness over damping, at least [1/s]. A joint with more damping returns too slowly."""
@@ -198,21 +198,15 @@ def _merge(targets: Iterable[GainTarget]) -> list[GainTarget]:
 def _wheels(facts: Facts, sim: SimModel) -> frozenset[str]:
     """Return the actuated joints that turn a wheel at the end of a leg, or elsewhere."""
     legs = {joint.name for leg in facts.legs for joint in (*leg.joints, *leg.branches)}
-    wheels = {facts.bodies[index].joint for index in facts.wheels}
-    return frozenset(
-        name
-        for name in sim.actuated
-        if name in facts.body_of_joint
-        and (joint := facts.body_of_joint[name].joint) is not None
-        and (
-            joint in wheels
-            or (
-                name not in legs
-                and turns_without_limits(joint)
-                and facts.is_wheel(facts.body_of_joint[name])
-            )
-        )
-    )
+
+    def is_wheel(name: str) -> bool:
+        body = facts.body_of_joint.get(name)
+        if body is None or body.joint is None:
+            return False
+        is_other = name not in legs and turns_without_limits(body.joint) and facts.is_wheel(body)
+        return body.index in facts.wheels or is_other
+
+    return frozenset(filter(is_wheel, sim.actuated))
 
 
 def _wheel_gain(

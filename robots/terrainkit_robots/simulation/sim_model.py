@@ -18,7 +18,15 @@ from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.description.model import Geometry, Inertial, Link, RobotModel
+from terrainkit_robots.description.model import (
+    PRISMATIC,
+    REVOLUTE,
+    Geometry,
+    Inertial,
+    JointUnits,
+    Link,
+    RobotModel,
+)
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
@@ -26,7 +34,6 @@ from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE, JointUnits
 
 if TYPE_CHECKING:
     from pathlib import Path

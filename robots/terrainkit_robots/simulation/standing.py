@@ -1,8 +1,8 @@
 """Let a robot stand in its pose under position control."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -196,10 +196,7 @@ def stand_test(
         rollout = Rollout(sim, gains, self_collision=self_collision)
         # Without a drop, a failure is a failure to stand and not to land.
         rollout.reset(qpos, clearance=0.0)
-        recorder = _Recorder(rollout, positions, areas, seconds)
-        for step in rollout.steps(seconds):
-            recorder.update(step)
-        return recorder.result()
+        return _stand(rollout, positions, areas, seconds)
 
 
 def _level(normal: Matrix) -> Matrix:
@@ -208,96 +205,76 @@ def _level(normal: Matrix) -> Matrix:
     return np.asarray(quat / np.linalg.norm(quat))
 
 
-@dataclass(eq=False)
-class _Recorder:
-    """Accumulates the measurements while a robot stands."""
+def _stand(
+    rollout: Rollout, positions: Mapping[str, float], areas: Sequence[ContactArea], seconds: float
+) -> StandResult:
+    """Return the motion of a robot that holds joint positions from the current state on."""
+    import mujoco
 
-    rollout: Rollout
-    positions: Mapping[str, float]
-    areas: Sequence[ContactArea]
-    seconds: float
-    max_tilt: float = 0.0
-    other_bodies: set[int] = field(default_factory=set)
-    contact_feet: set[str] = field(default_factory=set)
-    steps: int = 0
+    sim, model, data = rollout.sim, rollout.model, rollout.data
+    time_step = float(model.opt.timestep)
+    start = data.qpos[:3].copy()
+    up = quat_to_matrix(data.qpos[3:7])[:, 2]
+    targets = dict(zip(sim.joints, data.qpos[7:], strict=True)) | dict(positions)
+    data.ctrl[:] = [targets[name] for name in sim.actuated]
+    ranges = model.actuator_forcerange[:, 1]
+    limited = (model.actuator_forcelimited != 0) & (ranges > 0)
+    efforts = np.where(limited, ranges, np.inf)
+    bodies = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, area.body) for area in areas]
+    area_of = {body: area for body, area in zip(bodies, areas, strict=True) if body >= 0}
 
-    def __post_init__(self) -> None:
-        import mujoco
+    def tilt() -> float:
+        return math.acos(np.clip(up @ quat_to_matrix(data.qpos[3:7])[:, 2], -1.0, 1.0))
 
-        sim, model, data = self.rollout.sim, self.rollout.model, self.rollout.data
-        self.start = data.qpos[:3].copy()
-        self.up = quat_to_matrix(data.qpos[3:7])[:, 2]
-        targets = dict(zip(sim.joints, data.qpos[7:], strict=True)) | dict(self.positions)
-        data.ctrl[:] = [targets[name] for name in sim.actuated]
-        self.targets = np.array([targets[name] for name in sim.joints])
-        ranges = model.actuator_forcerange[:, 1]
-        limited = (model.actuator_forcelimited != 0) & (ranges > 0)
-        self.efforts = np.where(limited, ranges, np.inf)
-        self.saturation = np.zeros(model.nu)
-        self.area_of: dict[int, ContactArea] = {}
-        for area in self.areas:
-            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, area.body)
-            if body >= 0:
-                self.area_of[body] = area
-
-    def update(self, step: int) -> None:
-        """Measure the state after a step."""
-        self.steps = step + 1
+    steps = 0
+    max_tilt = 0.0
+    shares = np.zeros(model.nu)
+    other_bodies: set[int] = set()
+    contact_feet: set[str] = set()
+    for step in rollout.steps(seconds):
+        steps = step + 1
         if step % _DECIMATION:
-            return
-        data = self.rollout.data
-        time = step * float(self.rollout.model.opt.timestep)
-        self.max_tilt = max(self.max_tilt, self._tilt())
-        if 2 * time >= self.seconds:
-            saturation = np.abs(data.actuator_force) / self.efforts
-            np.maximum(self.saturation, saturation, out=self.saturation)
-        self._record_contacts(is_final=time >= self.seconds - _FINAL_SECONDS)
+            continue
+        time = step * time_step
+        max_tilt = max(max_tilt, tilt())
+        if 2 * time >= seconds:
+            shares = np.maximum(shares, np.abs(data.actuator_force) / efforts)
+        for body, point in _floor_contacts(model, data):
+            area = area_of.get(body)
+            if area is None or not _is_within(area, data, body, point):
+                other_bodies.add(body)
+            elif time >= seconds - _FINAL_SECONDS:
+                contact_feet.add(area.foot)
+    motion = data.qpos[:3] - start
+    error = np.abs(data.qpos[7:] - [targets[name] for name in sim.joints])
+    saturation = float(shares.max(initial=0.0))
+    feet = dict.fromkeys(area.foot for area in area_of.values())
+    return StandResult(
+        tilt=tilt(),
+        max_tilt=max(max_tilt, tilt()),
+        height=float(data.qpos[2]),
+        height_loss=-float(motion[2]),
+        drift=float(np.hypot(motion[0], motion[1])),
+        leg_length=min((area.leg_length for area in areas), default=math.inf),
+        other_contacts=tuple(model.body(body).name for body in sorted(other_bodies)),
+        lifted_feet=tuple(foot for foot in feet if foot not in contact_feet),
+        saturation=saturation,
+        saturated_joint=sim.actuated[int(shares.argmax())] if saturation > 0 else "",
+        joint_error=float(error.max(initial=0.0)),
+        diverged=rollout.diverged,
+        seconds=steps * time_step,
+    )
 
-    def _tilt(self) -> float:
-        up = quat_to_matrix(self.rollout.data.qpos[3:7])[:, 2]
-        return math.acos(np.clip(self.up @ up, -1.0, 1.0))
 
-    def _record_contacts(self, *, is_final: bool) -> None:
-        """Record the bodies that touch the floor outside of their area, and the final feet."""
-        model, data = self.rollout.model, self.rollout.data
-        pairs = model.geom_bodyid[data.contact.geom]
-        for contact in np.flatnonzero((pairs == 0).any(axis=1)):
-            body = int(pairs[contact].max())
-            area = self.area_of.get(body)
-            if area is None or not self._is_within(area, body, data.contact.pos[contact]):
-                self.other_bodies.add(body)
-            elif is_final:
-                self.contact_feet.add(area.foot)
+def _floor_contacts(model: Any, data: Any) -> Iterator[tuple[int, Any]]:
+    """Yield each contact with the floor: the body, and the point in the world, shape (3,) [m]."""
+    pairs = model.geom_bodyid[data.contact.geom]
+    for contact in np.flatnonzero((pairs == 0).any(axis=1)):
+        yield int(pairs[contact].max()), data.contact.pos[contact]
 
-    def _is_within(self, area: ContactArea, body: int, point: Any) -> bool:
-        if math.isinf(area.radius):
-            return True
-        data = self.rollout.data
-        center = data.xpos[body] + data.xmat[body].reshape(3, 3) @ area.center
-        return bool(np.linalg.norm(point - center) <= area.radius)
 
-    def result(self) -> StandResult:
-        """Return the measurements."""
-        rollout, data = self.rollout, self.rollout.data
-        error = np.abs(data.qpos[7:] - self.targets)
-        motion = data.qpos[:3] - self.start
-        saturation = float(self.saturation.max(initial=0.0))
-        saturated = rollout.sim.actuated[int(self.saturation.argmax())] if saturation > 0 else ""
-        feet = dict.fromkeys(area.foot for area in self.area_of.values())
-        return StandResult(
-            tilt=self._tilt(),
-            max_tilt=max(self.max_tilt, self._tilt()),
-            height=float(data.qpos[2]),
-            height_loss=-float(motion[2]),
-            drift=float(np.hypot(motion[0], motion[1])),
-            leg_length=min((area.leg_length for area in self.areas), default=math.inf),
-            other_contacts=tuple(
-                rollout.model.body(body).name for body in sorted(self.other_bodies)
-            ),
-            lifted_feet=tuple(foot for foot in feet if foot not in self.contact_feet),
-            saturation=saturation,
-            saturated_joint=saturated,
-            joint_error=float(error.max(initial=0.0)),
-            diverged=rollout.diverged,
-            seconds=self.steps * float(rollout.model.opt.timestep),
-        )
+def _is_within(area: ContactArea, data: Any, body: int, point: Any) -> bool:
+    if math.isinf(area.radius):
+        return True
+    center = data.xpos[body] + data.xmat[body].reshape(3, 3) @ area.center
+    return bool(np.linalg.norm(point - center) <= area.radius)

@@ -13,8 +13,8 @@ import numpy as np
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
+from terrainkit_robots.description.model import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.gain import GainSet
-from terrainkit_robots.simulation.joint_units import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 from terrainkit_robots.simulation.time_step import (
     JointInertia,
@@ -84,7 +84,7 @@ class _RequiredStiffness:
     stiffness: float
     task: str
 
-    min_error: float
+    min_error: float = _MIN_ERROR
     """Error at which the joint may reach its effort limit, at least [rad]; for a prismatic joint
     divided by the lever."""
 
@@ -143,12 +143,9 @@ def other_gain_target(
         _RequiredStiffness(
             stiffness=load / sag,
             task=f"to hold its own {load:.2g} {units.effort} within {sag:g} {units.position}",
-            min_error=_MIN_ERROR,
         ),
         _RequiredStiffness(
-            stiffness=dynamic,
-            task=f"for a natural frequency of {_MIN_FREQUENCY:g} rad/s",
-            min_error=_MIN_ERROR,
+            stiffness=dynamic, task=f"for a natural frequency of {_MIN_FREQUENCY:g} rad/s"
         ),
     ]
     return _make_target(sim, inertia, joints, required)

@@ -211,15 +211,14 @@ def stand_as_written(
     import mujoco
 
     model = copy.copy(written.model)
-    dofs, addresses, gains, efforts = [], [], [], []
-    for name, gain in written.gains.items():
-        joint = model.joint(name)
-        dofs.append(joint.dofadr[0])
-        addresses.append(joint.qposadr[0])
-        gains.append(gain.stiffness)
-        efforts.append(written.efforts.get(name, np.inf))
-        model.dof_damping[joint.dofadr[0]] += gain.damping
-        model.dof_armature[joint.dofadr[0]] = gain.armature
+    gains = written.gains.values()
+    joints = [model.joint(name) for name in written.gains]
+    dofs = [joint.dofadr[0] for joint in joints]
+    addresses = [joint.qposadr[0] for joint in joints]
+    stiffness = np.array([gain.stiffness for gain in gains])
+    limits = np.array([written.efforts.get(name, np.inf) for name in written.gains])
+    model.dof_damping[dofs] += [gain.damping for gain in gains]
+    model.dof_armature[dofs] = [gain.armature for gain in gains]
     if written.held:
         model.dof_armature[3:6] = _HOLD_RATIO * written.weight / GRAVITY * written.leg_length**2
     for name, value in (settings or {}).items():
@@ -232,7 +231,7 @@ def stand_as_written(
         mujoco.mj_setConst(model, data)
         for name, position in written.positions.items():
             data.qpos[model.joint(name).qposadr[0]] = position
-        targets, stiffness, limits = data.qpos[addresses], np.array(gains), np.array(efforts)
+        targets = data.qpos[addresses]
         for index in position_servos(model):
             joint = model.actuator_trnid[index, 0]
             length = model.actuator_gear[index, 0] * data.qpos[model.jnt_qposadr[joint]]

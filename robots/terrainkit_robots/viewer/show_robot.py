@@ -13,6 +13,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.text import group
 from terrainkit_robots.viewer.robot_scene import RobotScene, body_node
 
 if TYPE_CHECKING:
@@ -123,12 +124,9 @@ def slider_range(joint: Joint, position: float) -> tuple[float, float]:
 
 def add_markers(server: "viser.ViserServer", report: Report) -> "list[viser.SceneNodeHandle]":
     """Add a sphere and the codes of its findings to each link or joint that has findings."""
-    places: dict[Place, list[Finding]] = {}
     locate = FindingPlaces(report.facts)
-    for finding in report.findings:
-        place = locate(finding)
-        if place is not None:
-            places.setdefault(place, []).append(finding)
+    located = ((locate(finding), finding) for finding in report.findings)
+    places = group((place, finding) for place, finding in located if place is not None)
     size = max((np.linalg.norm(body.zero_pose[:3, 3]) for body in report.facts.bodies), default=0)
     handles: list[viser.SceneNodeHandle] = []
     for k, ((body, point), findings) in enumerate(places.items()):

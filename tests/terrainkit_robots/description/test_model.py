@@ -22,7 +22,8 @@ JOINT = Joint(name="j", source=SOURCE, kind="revolute", parent="a", child="b")
 )
 def test_joint_units(kind, moves, units):
     joint = replace(JOINT, kind=kind)
-    assert (joint.moves, (joint.unit, joint.effort_unit, joint.speed_unit)) == (moves, units)
+    found = joint.unit, joint.units.effort, joint.units.velocity
+    assert (joint.moves, found) == (moves, units)
 
 
 @pytest.mark.parametrize(

@@ -306,7 +306,7 @@ def safeties_of_fixes(case, folder):
     if not (safeties if unsafe else "safe" in safeties):
         assert {f.message for f in own} <= {f.message for f in result.report.findings}, case
         return safeties
-    assert case.code in {f.code for f in result.fixed}, (case, result.unfixed)
+    assert case.code in {f.code for f in result.report.fixed}, (case, result.report.unfixed)
     assert len([f for f in result.report.findings if f.code == case.code]) < len(own), case
     assert problems(result.report) <= problems(reports[0]), case
     write_fixes(result)

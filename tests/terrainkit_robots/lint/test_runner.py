@@ -12,7 +12,7 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.check import lint_selected
-from terrainkit_robots.lint.rule import FAMILIES, Rule, Violation, rules
+from terrainkit_robots.lint.rule import FAMILIES, Part, Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, has_inputs, lint
 from terrainkit_robots.lint.settings import Settings
 from tests.small_robots import URDF, facts, joint, link
@@ -22,7 +22,8 @@ UNITS = ((1, "mass"), (2, "length"))
 
 
 def violation(subject="a", line=1, **more):
-    return Violation(subject=subject, source=Source(file=URDF, line=line), message="m", **more)
+    part = Part(subject, Source(file=URDF, line=line))
+    return Violation(element=part, message="m", **more)
 
 
 def rule(check, code="INR099", severity="error", *, needs=()):
@@ -50,16 +51,16 @@ def report(*selected, robot=None):
 
 def test_finding_combines_rule_and_violation():
     whole = {
-        "subject": "calf",
-        "source": Source(file=Path("/robots/part.urdf"), line=7),
         "message": "the mass is -1 kg",
         "measured": {"mass": -1.0},
         "certainty": "likely",
         "fix": Fix(safety="safe", description="d", edits=()),
     }
-    (found,) = report(rule([Violation(**whole)])).findings
+    part = Part("calf", Source(file=Path("/robots/part.urdf"), line=7))
+    (found,) = report(rule([Violation(element=part, **whole)])).findings
     about = {"code": "INR099", "name": "a-rule", "severity": "error", "hint": "Do this."}
-    expected = whole | about | {"file": Path("/robots/part.urdf"), "line": 7}
+    place = {"subject": "calf", "file": Path("/robots/part.urdf"), "line": 7}
+    expected = whole | about | place
     assert {name: getattr(found, name) for name in expected} == expected
 
 

@@ -1,7 +1,3 @@
-from types import SimpleNamespace
-from unittest.mock import MagicMock
-
-import mujoco
 import numpy as np
 import pytest
 import torch
@@ -14,9 +10,8 @@ from terrainkit_robots.policy.play import (
     demo_commands,
     play,
     select_tracked_robots,
-    view,
 )
-from terrainkit_robots.rl.config import Commands, Env, Terrain
+from terrainkit_robots.rl.config import Commands, Terrain
 
 
 @pytest.fixture(autouse=True)
@@ -111,30 +106,3 @@ def test_play_without_video_records_nothing(make_run):
 def test_play_rejects_zero_robots(make_run):
     with pytest.raises(ConfigError, match="robots: got 0; expected 1 or more"):
         play(make_run(), robots=0)
-
-
-def test_view_requires_a_display(make_run, monkeypatch):
-    monkeypatch.setattr(module.sys, "platform", "linux")
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    with pytest.raises(ConfigError, match="expected a display"):
-        view(make_run())
-
-
-def test_view_shows_the_robot_until_closed(make_run, monkeypatch):
-    shown, handle = [], MagicMock()
-    handle.__enter__.return_value = handle
-    handle.is_running.side_effect = lambda: len(shown) < 3
-
-    def launch_passive(_, data):
-        handle.sync.side_effect = lambda: shown.append(data.qpos.copy())
-        return handle
-
-    monkeypatch.setenv("DISPLAY", ":0")
-    viewer = SimpleNamespace(launch_passive=launch_passive)
-    monkeypatch.setitem(module.sys.modules, "mujoco.viewer", viewer)
-    monkeypatch.setattr(mujoco, "viewer", viewer, raising=False)
-    view(make_run(env=Env(num_threads=1)), EvaluationConfig(seconds=0.04))
-    assert len(shown) == 3
-    assert not np.array_equal(shown[0], shown[2])
-    assert handle.cam.trackbodyid == 1

@@ -7,18 +7,20 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA, MIN_INERTIA
-from terrainkit_robots.description.model import Link, Source
+from terrainkit_robots.description.fix import Part
+from terrainkit_robots.description.model import Link
 from terrainkit_robots.transforms import Matrix
 
 
-def mass_source(link: Link) -> Source:
-    """Return where the mass of a link is written, or the link itself without one."""
-    return (link.inertial or link).source
+def mass_part(link: Link) -> Part:
+    """Return the part of a link with its mass, or the link itself without one."""
+    return Part(link.name, (link.inertial or link).source)
 
 
-def inertia_source(link: Link) -> Source:
-    """Return where the inertia of a link is written, or the link itself without one."""
-    return (link.inertial and link.inertial.inertia_source) or mass_source(link)
+def inertia_part(link: Link) -> Part:
+    """Return the part of a link with its inertia, or the link itself without one."""
+    source = link.inertial and link.inertial.inertia_source
+    return Part(link.name, source) if source else mass_part(link)
 
 
 def main_cause(body: Body) -> Link:

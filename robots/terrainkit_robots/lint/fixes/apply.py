@@ -38,14 +38,6 @@ _NEW_SUFFIXES = frozenset({".stl", ".obj"})
 """Suffixes of files that a fix may create."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Unfixed:
-    """A finding whose fix was not applied or had no effect."""
-
-    finding: Finding
-    reason: str
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FixResult:
     """The result of fixing a robot. Nothing is written yet."""
@@ -59,14 +51,8 @@ class FixResult:
     new: Mapping[Path, bytes]
     """Contents of the files to create."""
 
-    fixed: tuple[Finding, ...]
-    """Findings that no longer occur."""
-
-    unfixed: tuple[Unfixed, ...]
-    """Findings that have a fix and still occur."""
-
     report: Report
-    """The report on the fixed robot."""
+    """The report on the fixed robot, with the findings that were fixed and those that were not."""
 
 
 def fix_robot(
@@ -101,13 +87,15 @@ def fix_robot(
         before={files.path[p]: files.original[p] for p in changed},
         after={files.path[p]: files.current[p] for p in changed},
         new={files.path[p]: files.current[p] for p in created},
-        fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
-        unfixed=tuple(
-            Unfixed(finding=f, reason=reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
-            for f in report.findings
-            if f.fix is not None
+        report=replace(
+            report,
+            fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
+            unfixed=tuple(
+                (f, reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
+                for f in report.findings
+                if f.fix is not None and (unsafe or f.fix.safety == "safe")
+            ),
         ),
-        report=report,
     )
 
 
@@ -175,11 +163,9 @@ def _apply_round(
     done: list[Finding] = []
     reasons: dict[_Key, str] = {}
     for finding in report.findings:
-        if finding.fix is None:
+        if finding.fix is None or not (unsafe or finding.fix.safety == "safe"):
             continue
         try:
-            if finding.fix.safety != "safe" and not unsafe:
-                raise EditError("the fix is unsafe, because it changes the robot")
             # A fix that is found again after it was applied would be applied in every round.
             if not inserted.isdisjoint(_insertions(finding)):
                 raise EditError("the fix was applied without effect")
@@ -281,17 +267,13 @@ class _Batch:
         if existing is None:
             if not os.path.lexists(path):
                 return True
-            existing = path.read_bytes() if _is_regular(path, len(data)) else None
+            status = path.stat(follow_symlinks=False)
+            is_same_size = stat.S_ISREG(status.st_mode) and status.st_size == len(data)
+            existing = path.read_bytes() if is_same_size else None
         if existing != data:
             name = display_path(self._files.path[path])
             raise EditError(f"{name} exists with different content")
         return False
-
-
-def _is_regular(path: Path, size: int) -> bool:
-    """Return whether the path is a regular file of this size."""
-    status = path.stat(follow_symlinks=False)
-    return stat.S_ISREG(status.st_mode) and status.st_size == size
 
 
 def write_fixes(result: FixResult) -> None:

@@ -117,7 +117,6 @@ class _Element:
     index: int
     """Index in the order of start tags."""
 
-    name: bytes
     start: int
     name_end: int
     attributes_end: int
@@ -130,11 +129,6 @@ class _Element:
     """Start of the end tag, or `tag_end` if there is none."""
 
     end: int
-
-    @property
-    def is_empty_tag(self) -> bool:
-        """Whether the element is a single tag that ends with `/>`."""
-        return self.tag_end == self.end
 
     @property
     def tag(self) -> tuple[int, int]:
@@ -155,14 +149,14 @@ class _Text:
         """
         if source.element is None:
             raise EditError("the element cannot be edited: its file is generated or malformed")
-        count = len(self._index[0])
+        count = len(self._positions[0])
         if not 0 <= source.element < count:
             raise EditError(f"element index: got {source.element}; expected less than {count}")
         return self._element(source.element)
 
     def child(self, parent: _Element) -> _Element | None:
         """Return the first child of an element."""
-        index, starts = parent.index + 1, self._index[0]
+        index, starts = parent.index + 1, self._positions[0]
         inside = index < len(starts) and starts[index] < parent.close
         return self._element(index) if inside else None
 
@@ -185,13 +179,6 @@ class _Text:
         end = len(self.data) if newline < 0 else newline + 1
         return None if self.data[position:end].strip() else end
 
-    @cached_property
-    def indent(self) -> bytes:
-        """White space by which the file indents children."""
-        if len(self._index[0]) > 1:
-            return self.indent_before(self._index[0][1]) or b"  "
-        return b"  "
-
     def newline(self, position: int) -> bytes:
         """Return the line end that is used near `position`."""
         found = self.data.rfind(b"\n", 0, position)
@@ -203,7 +190,7 @@ class _Text:
         return text.encode(self._positions[2], "xmlcharrefreplace")
 
     def _element(self, index: int) -> _Element:
-        start, close = self._index[0][index], self._index[1][index]
+        start, close = self._positions[0][index], self._positions[1][index]
         tag = _START_TAG.match(self.data, start)
         if tag is None:
             raise EditError("the encoding of the file is not supported; expected UTF-8")
@@ -213,7 +200,6 @@ class _Text:
             raise EditError("the element has no end tag")
         return _Element(
             index=index,
-            name=tag["name"],
             start=start,
             name_end=tag.end("name"),
             attributes_end=tag.end("attributes"),
@@ -221,10 +207,6 @@ class _Text:
             close=tag.end() if is_empty_tag else close,
             end=tag.end() if is_empty_tag or end_tag is None else end_tag.end(),
         )
-
-    @property
-    def _index(self) -> tuple[Sequence[int], Sequence[int]]:
-        return self._positions[0], self._positions[1]
 
     @cached_property
     def _positions(self) -> tuple[Sequence[int], Sequence[int], str]:
@@ -266,7 +248,6 @@ class _Text:
 def _make_replacements(text: _Text, edits: Sequence[Edit]) -> Iterator[_Replacement]:
     """Yield the replacements for `edits`."""
     changed: set[tuple[int | None, str]] = set()
-    children: dict[int, list[InsertChild]] = {}
     for edit in edits:
         match edit:
             case SetAttribute() | RemoveAttribute():
@@ -277,13 +258,11 @@ def _make_replacements(text: _Text, edits: Sequence[Edit]) -> Iterator[_Replacem
             case RemoveElement():
                 yield _remove(text, text.element(edit.source))
             case InsertChild():
-                children.setdefault(text.element(edit.source).index, []).append(edit)
+                yield _insert(text, edit)
             case ReplaceBytes():
                 yield _replace(text, edit)
             case WriteFile():
                 raise EditError(f"{edit.path.name} is a new file and no edit of this one")
-    for insertions in children.values():
-        yield from _insert(text, text.element(insertions[0].source), insertions)
 
 
 def _replace(text: _Text, edit: ReplaceBytes) -> _Replacement:
@@ -352,53 +331,14 @@ def _remove(text: _Text, element: _Element) -> _Replacement:
     return _Replacement(start=start, end=end, data=b"", lock=(start, end))
 
 
-def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iterator[_Replacement]:
-    for edit in edits:
-        _check_element(edit.xml)
-    first = [text.encode(edit.xml) for edit in edits if edit.first]
-    last = [text.encode(edit.xml) for edit in edits if not edit.first]
-    if not text.data[parent.tag_end : parent.close].strip():
-        yield _fill(text, parent, [*first, *last])
-        return
-    parent_indent = text.indent_before(parent.start)
+def _insert(text: _Text, edit: InsertChild) -> _Replacement:
+    parent = text.element(edit.source)
     child = text.child(parent)
-    indent = None if parent_indent is None else parent_indent + text.indent
-    if child is not None:
-        indent = text.indent_before(child.start)
+    if child is None:
+        raise EditError("an element without children cannot get one")
+    indent = text.indent_before(child.start)
     prefix = b"" if indent is None else text.newline(parent.start) + indent
-    if first:
-        comments = _COMMENTS.match(text.data, parent.tag_end)
-        yield _insert_at(comments.end() if comments else parent.tag_end, prefix, first)
-    if last:
-        content = text.data[parent.tag_end : parent.close].rstrip()
-        yield _insert_at(parent.tag_end + len(content), prefix, last)
-
-
-def _insert_at(position: int, prefix: bytes, elements: Sequence[bytes]) -> _Replacement:
-    new = b"".join(prefix + element for element in elements)
+    comments = _COMMENTS.match(text.data, parent.tag_end)
+    position = comments.end() if comments else parent.tag_end
+    new = prefix + text.encode(edit.xml)
     return _Replacement(start=position, end=position, data=new, lock=(position, position))
-
-
-def _fill(text: _Text, parent: _Element, elements: Sequence[bytes]) -> _Replacement:
-    """Return the replacement that adds children to an empty element."""
-    indent = text.indent_before(parent.start)
-    newline = text.newline(parent.start)
-    outer = b"" if indent is None else newline + indent
-    inner = b"" if indent is None else outer + text.indent
-    content = b"".join(inner + element for element in elements) + outer
-    if not parent.is_empty_tag:
-        lock = parent.tag_end, parent.close
-        return _Replacement(start=lock[0], end=lock[1], data=content, lock=lock)
-    return _Replacement(
-        start=parent.attributes_end,
-        end=parent.tag_end,
-        data=b">" + content + b"</" + parent.name + b">",
-        lock=parent.tag,
-    )
-
-
-def _check_element(xml: str) -> None:
-    try:
-        expat.ParserCreate().Parse(xml.encode(), True)
-    except (expat.ExpatError, UnicodeEncodeError) as error:
-        raise EditError(f"{xml!r} is not a valid XML element: {error}") from error

@@ -59,12 +59,13 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
-    paragraphs = (rule.why, f"How to fix: {rule.how_to_fix}", f"Source: {rule.reference}")
+    title, why, how_to_fix, reference = rule.page
+    paragraphs = (why, f"How to fix: {how_to_fix}", f"Source: {reference}")
     return {
         "id": rule.code,
         "name": rule.name,
-        "shortDescription": {"text": rule.title},
-        "fullDescription": {"text": rule.why},
+        "shortDescription": {"text": title},
+        "fullDescription": {"text": why},
         "help": {"text": "\n\n".join(paragraphs)},
         "defaultConfiguration": {"level": rule.severity},
         "properties": {"tags": ["robot", families()[rule.family].title], "fixes": rule.fixes},

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.settings.text import truncate
@@ -58,13 +57,6 @@ class ContractError(ConfigError):
     def __init__(self, got: str, expected: str = "") -> None:
         super().__init__(f"{got}; expected {expected}" if expected else got)
         self.got, self.expected = got, expected
-
-
-class Doubt(NamedTuple):
-    """A doubtful value of a contract."""
-
-    got: str
-    expected: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,8 +128,8 @@ class Contract:
     commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Ranges of `lin_vel_x`, `lin_vel_y` [m/s] and `ang_vel_z` [rad/s]."""
 
-    doubts: tuple[Doubt, ...] = ()
-    """What is doubtful in the file."""
+    doubts: tuple[ContractError, ...] = ()
+    """What is doubtful in the file, but can be read."""
 
     def __post_init__(self) -> None:
         """Check that there is one value for each joint, and at least one term.

@@ -10,8 +10,8 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.policy.contracts.contract import (
     UNITREE,
     Contract,
+    ContractError,
     ContractTerm,
-    Doubt,
     check_length,
 )
 
@@ -134,7 +134,7 @@ def _read(file: _Deploy, joints: tuple[str, ...]) -> Contract:
         check_length(name, values, count)
         gains.append(tuple(values))
         doubts.append(
-            Doubt(
+            ContractError(
                 f"{name}: got {count} values for motors up to {max(motors)}; Unitree's controller "
                 "gives value k to motor k",
                 f"{max(motors) + 1} values, 0 without a joint",

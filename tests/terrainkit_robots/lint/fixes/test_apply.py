@@ -90,7 +90,7 @@ def with_mesh(path, content=lambda: b"mesh"):
 
 
 def reasons(result):
-    return [each.reason for each in result.unfixed]
+    return [reason for _, reason in result.report.unfixed]
 
 
 @pytest.fixture
@@ -107,8 +107,8 @@ class TestFixRobot:
         assert result.before == {robot: ROBOT.encode()}
         assert result.after == {robot: ROBOT.replace("-1", "1").replace("-2", "2").encode()}
         assert result.new == {}
-        assert [each.subject for each in result.fixed] == ["a", "b"]
-        assert result.unfixed == result.report.findings == ()
+        assert [each.subject for each in result.report.fixed] == ["a", "b"]
+        assert result.report.unfixed == result.report.findings == ()
         assert robot.read_bytes() == ROBOT.encode()
 
     def test_overlapping_fixes_take_several_rounds(self, robot):
@@ -119,7 +119,7 @@ class TestFixRobot:
                     yield finding(element.get("name"), f"no {name}", source, edit)
 
         result = fixed(robot, find)
-        assert (len(result.fixed), result.unfixed) == (6, ())
+        assert (len(result.report.fixed), result.report.unfixed) == (6, ())
         links = etree.fromstring(result.after[robot]).iter("link")
         assert [[link.get(name) for name in "xyz"] for link in links] == [["1"] * 3] * 2
 
@@ -130,12 +130,12 @@ class TestFixRobot:
 
         kept = fixed(robot, find)
         assert kept.after == {}
-        assert reasons(kept) == ["the fix is unsafe, because it changes the robot"]
+        assert kept.report.fixed == kept.report.unfixed == ()
         assert b'"b"' not in fixed(robot, find, unsafe=True).after[robot]
 
     def test_findings_without_fix_stay_in_report(self, robot):
         result = fixed(robot, lambda _, source: [finding("a", "here", source)])
-        assert result.fixed == result.unfixed == ()
+        assert result.report.fixed == result.report.unfixed == ()
         assert len(result.report.findings) == 3
 
     def test_ineffective_insertion_is_applied_once(self, robot):
@@ -146,7 +146,8 @@ class TestFixRobot:
 
         result = fixed(robot, find)
         assert result.after[robot].count(b"<link/>") == 1
-        assert (result.fixed, reasons(result)) == ((), ["the fix was applied without effect"])
+        assert result.report.fixed == ()
+        assert reasons(result) == ["the fix was applied without effect"]
 
     @pytest.mark.parametrize(
         ("new_name", "reason", "letters"),
@@ -174,7 +175,7 @@ class TestFixRobot:
                 yield finding("r", "nowhere", source, *edits)
 
         result = fixed(robot, find)
-        assert len(result.fixed) == 2
+        assert len(result.report.fixed) == 2
         assert reasons(result) == ["element index: got 99; expected less than 3"]
         assert b'x="1"' not in result.after[robot]
 
@@ -191,7 +192,7 @@ class TestChangedFiles:
         part.write_text(ROBOT)
         result = fixed(robot, positive_masses, part)
         assert set(result.after) == {robot, part}
-        assert len(result.fixed) == 2  # equal findings in both files
+        assert len(result.report.fixed) == 2  # equal findings in both files
         assert result.report.findings == ()
 
     @pytest.mark.parametrize("link", [False, True])
@@ -231,7 +232,7 @@ class TestNewFiles:
         assert b'mesh="new"' in robot.read_bytes()
         again = fixed(robot, with_mesh(path))
         assert again.after == again.before == again.new == {}
-        assert again.fixed == again.unfixed == ()
+        assert again.report.fixed == again.report.unfixed == ()
         assert unified_diff(again) == ""
 
     @pytest.mark.parametrize(
@@ -247,13 +248,13 @@ class TestNewFiles:
         (robot.parent / "dangling.stl").symlink_to(other / "new.stl")
         result = fixed(robot, with_mesh(robot.parent / where))
         assert result.after == result.new == {}
-        assert reason in result.unfixed[0].reason
+        assert reason in reasons(result)[0]
 
     def test_equal_existing_file_is_used(self, robot):
         path = robot.parent / "foot.stl"
         path.write_bytes(b"mesh")
         result = fixed(robot, with_mesh(path))
-        assert (result.new, len(result.fixed)) == ({}, 1)
+        assert (result.new, len(result.report.fixed)) == ({}, 1)
 
     def test_two_fixes_must_write_equal_content(self, robot):
         path = robot.parent / "foot.stl"
@@ -266,11 +267,11 @@ class TestNewFiles:
                 yield finding(name, "no mesh", source, new, edit)
 
         result = fixed(robot, find)
-        assert [each.subject for each in result.fixed] == ["a"]
+        assert [each.subject for each in result.report.fixed] == ["a"]
         assert reasons(result) == [f"{path} exists with different content"]
         robot.write_text(ROBOT.replace("-2", "-1"))
         result = fixed(robot, find)
-        assert [each.subject for each in result.fixed] == ["a", "b"]
+        assert [each.subject for each in result.report.fixed] == ["a", "b"]
         assert result.new == {path: b"-1"}
 
     def test_failed_content_is_unfixed(self, robot):

@@ -2,7 +2,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
@@ -37,8 +37,8 @@ def without(element, name):
     return RemoveAttribute(source=at(element), name=name)
 
 
-def child(element, xml, *, first=False):
-    return InsertChild(source=at(element), xml=xml, first=first)
+def child(element, xml):
+    return InsertChild(source=at(element), xml=xml)
 
 
 def edit_bytes(data, edits):
@@ -84,15 +84,9 @@ def test_element_is_removed_with_its_own_lines(before, after):
     assert edited(before, removed(1)) == after
 
 
-@pytest.mark.parametrize(("before", "first", "last"), EDITS["inserted"])
-def test_child_is_inserted_first_or_last(before, first, last):
-    assert edited(before, child(0, "<n/>", first=True)) == first
-    assert edited(before, child(0, "<n/>")) == last
-
-
-@pytest.mark.parametrize(("before", "tags", "after"), EDITS["inner"])
-def test_children_of_inner_elements_are_indented(before, tags, after):
-    assert edited(before, *(child(1, f"<{tag}/>") for tag in tags)) == after
+@pytest.mark.parametrize(("before", "after"), EDITS["inserted"])
+def test_child_is_inserted_first(before, after):
+    assert edited(before, child(0, "<n/>")) == after
 
 
 SET = set_to(0, "x", "1")
@@ -103,10 +97,7 @@ REJECTED = {
     ],
     "attribute 'x' does not exist": [("<a y='1'/>", without(0, "x"))],
     "root": [("<a/>", removed(0))],
-    "is not a valid XML element": [
-        ("<r/>", child(0, xml))
-        for xml in ("", "text", "<a>", "<a/><b/>", "<a x=1/>", "<a>\ud800</a>")
-    ],
+    "without children": [(text, child(0, "<a/>")) for text in ("<r/>", "<r>x</r>")],
     "element index: got .*; expected less than 1": [
         ("<a/>", set_to(index, "x", "1")) for index in (-1, 1, 10**9)
     ],
@@ -169,7 +160,7 @@ def test_malformed_file_can_be_replaced():
         [set_to(1, "new", "1"), set_to(1, "new", "1")],
         [set_to(1, "x", "1"), without(1, "x")],
         [removed(1), set_to(2, "y", "1")],
-        [child(2, "<n/>"), removed(1)],
+        [child(1, "<n/>"), removed(1)],
         [removed(2), removed(1)],
     ],
     ids=["attribute", "new attribute", "removed attribute", "inside", "inserted", "twice"],
@@ -190,10 +181,8 @@ class TestSuccessiveFixes:
             (removed(1), set_to(2, "x", "1")),
             (set_to(2, "x", "1"), removed(1)),
             (child(0, "<n/>"), child(0, "<n/>")),
-            (child(3, "<n/>"), child(3, "<m/>")),
-            (child(0, "<n/>"), removed(3)),
         ],
-        ids=["tag", "attribute", "inside", "around", "position", "opened", "removed"],
+        ids=["tag", "attribute", "inside", "around", "position"],
     )
     def test_later_overlapping_fix_is_rejected(self, one, other):
         text = EditedBytes(self.TEXT)
@@ -208,7 +197,7 @@ class TestSuccessiveFixes:
         text.apply(text.prepare([set_to(1, "x", "1")]))
         text.apply(text.prepare([set_to(2, "z", "1")]))
         text.apply(text.prepare([removed(3)]))
-        text.apply(text.prepare([child(0, "<n/>", first=True)]))
+        text.apply(text.prepare([child(0, "<n/>")]))
         assert text.result() == b'<r>\n  <n/>\n  <a x="1" y="0"><b z="1"/></a>\n</r>'
 
     def test_many_fixes_are_fast(self):
@@ -274,7 +263,8 @@ def test_other_elements_are_unchanged(document, data):
 def test_inserted_element_can_be_removed(document, data):
     text, count = document
     index = data.draw(st.integers(0, count - 1))
-    inside = edited(text, child(index, "<new/>", first=data.draw(st.booleans())))
+    assume(len(next(etree.fromstring(text).iter(f"e{index}"))))
+    inside = edited(text, child(index, "<new/>"))
     root = etree.fromstring(inside)
     tags = [e.tag for e in root.iter(etree.Element)]
     place = tags.index("new")

@@ -97,8 +97,8 @@ def test_schema_rejects_invalid_results(report, spoil):
 def test_every_rule_has_help(report):
     listed = run_of(report)["tool"]["driver"]["rules"]
     for rule, theirs in zip(rules(), listed, strict=True):
-        assert (theirs["id"], theirs["shortDescription"]["text"]) == (rule.code, rule.title)
-        assert rule.how_to_fix in theirs["help"]["text"]
+        assert (theirs["id"], theirs["shortDescription"]["text"]) == (rule.code, rule.page.title)
+        assert rule.page.how_to_fix in theirs["help"]["text"]
 
 
 @pytest.mark.parametrize("name", ["a.urdf", "b c/ä%20#?.urdf", "x:y.urdf", "/abs/ü.xml", "\udc80"])

@@ -9,12 +9,12 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.model import PRISMATIC, REVOLUTE
 from terrainkit_robots.lint.rule import get_rule
 from terrainkit_robots.lint.rules.dyn import joint_sweep, stability, time_step
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.simulation.drop import DropResult
 from terrainkit_robots.simulation.joint_sweep import SweepResult
-from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE
 from tests.robots import QUADRUPED
 from tests.tables import read_table
 

@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.export.canonical import has_floating_base
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.text import count
 
 _MIN_FOOT_DEPTH = 0.005
@@ -153,8 +153,7 @@ def foot_contacts_disabled(robot: Facts) -> Violations:
         if enabled and height > min(enabled) - _MIN_FOOT_DEPTH:
             continue
         yield Violation(
-            subject=placed.geometry.name or placed.link,
-            source=placed.geometry.source,
+            element=Part(placed.geometry.name or placed.link, placed.geometry.source),
             message=f"contacts of the {placed.geometry.shape} of {placed.link}, the lowest shape "
             "of a leg: got contype 0 and conaffinity 0; expected one of them above 0",
         )

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import Geometry
@@ -53,8 +53,7 @@ def foot_friction(robot: Facts) -> Violations:
         if value == 0 and geometry.friction:
             expected = f"condim 1 and priority {geometry.priority}; expected condim 3"
         yield Violation(
-            subject=foot,
-            source=geometry.source,
+            element=Part(foot, geometry.source),
             message=f"sliding friction of foot {foot}: got {value:g}; {expected}",
             measured={"friction": value},
         )

@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.text import contrast
 
 if TYPE_CHECKING:
@@ -76,8 +76,7 @@ def overlap(robot: Facts) -> Violations:
         if _is_arbitrary_pose(robot, pair, deepest):
             level = 0
         yield Violation(
-            subject=" and ".join(pair),
-            source=deepest.second.geometry.source,
+            element=Part(" and ".join(pair), deepest.second.geometry.source),
             message=f"overlap of {'the convex hulls of ' if deepest.has_mesh else ''}"
             f"{deepest.first.link} and {deepest.second.link} at the default pose: got "
             f"{got} mm; expected at most {expected} mm",
@@ -144,8 +143,7 @@ def overlap_in_range(robot: Facts) -> Violations:
         if share > _MAX_OVERLAP_SHARE:
             got, expected = contrast(share, _MAX_OVERLAP_SHARE, ".0%")
             yield Violation(
-                subject=" and ".join(pair),
-                source=robot.tree.links[pair[0]].source,
+                element=Part(" and ".join(pair), robot.tree.links[pair[0]].source),
                 message=f"part of the joint range in which {pair[0]} and {pair[1]} overlap: got "
                 f"{got}; expected at most {expected}",
                 measured={"share": share},

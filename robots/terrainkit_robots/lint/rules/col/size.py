@@ -1,7 +1,7 @@
 """Rule on the sizes of shapes."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 
 @rule("COL004", "invalid-size", "error")
@@ -23,8 +23,7 @@ def invalid_size(robot: Facts) -> Violations:
                 invalid = [size for size in shape.size if size <= 0]
                 if invalid and shape.shape not in ("mesh", "plane"):
                     yield Violation(
-                        subject=link.name,
-                        source=shape.size_source or shape.source,
+                        element=Part(link.name, shape.size_source or shape.source),
                         message=f"size of a {kind} {shape.shape} of link {link.name}: got "
                         f"{invalid[0]:g} m; expected more than 0 m",
                         severity="error" if kind == "collision" else "warning",

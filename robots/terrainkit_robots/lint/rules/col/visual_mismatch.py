@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.description.model import Geometry, Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
 
@@ -61,20 +61,16 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
     """
     for link in robot.links:
         for collision in link.collisions:
+            mesh = collision.mesh
             same = [v for v in link.visuals if _is_same_file(collision, v)]
-            if not same or collision.fit_to_mesh:
-                continue
             differences = [_difference(collision, visual) for visual in same]
-            if not all(differences):
-                continue
-            assert collision.mesh is not None
-            yield Violation(
-                subject=link.name,
-                source=collision.source,
-                message=f"collision mesh {Path(collision.mesh.filename).name} of link {link.name}: "
-                f"got {differences[0]} the same mesh of the visual; expected the same pose and "
-                "scale",
-            )
+            if mesh is not None and differences and all(differences) and not collision.fit_to_mesh:
+                yield Violation(
+                    element=Part(link.name, collision.source),
+                    message=f"collision mesh {Path(mesh.filename).name} of link {link.name}: got "
+                    f"{differences[0]} the same mesh of the visual; expected the same pose and "
+                    "scale",
+                )
     yield from _resized_primitives(robot)
     yield from _turned_cylinders(robot)
 
@@ -101,8 +97,7 @@ def _turned_cylinders(robot: Facts) -> Violations:
         # One disk across its axis may be a lens that turns; wheels come in pairs.
         if reference.startswith("the visible") or len(across) > 1:
             yield Violation(
-                subject=shape.link,
-                source=shape.geometry.source,
+                element=Part(shape.link, shape.geometry.source),
                 certainty="likely",
                 message=f"axis of the collision cylinder of link {shape.link}: got "
                 f"{math.degrees(angle):.3g} deg to {reference}; expected 0 deg",
@@ -154,8 +149,7 @@ def _resized_primitives(robot: Facts) -> Violations:
     for name, collision, visual, ratio in found:
         if counts[ratio] == 1:
             yield Violation(
-                subject=name,
-                source=collision.size_source or collision.source,
+                element=Part(name, collision.size_source or collision.source),
                 certainty="likely",
                 message=f"size of the collision {collision.shape} of link {name}: got "
                 f"{numbers(collision.size)} m, {ratio:g} times the "
@@ -224,8 +218,7 @@ def collision_outside_visual(robot: Facts) -> Violations:
             share = _share_inside(box, visible)
             if share < _MIN_SHARE_INSIDE:
                 yield Violation(
-                    subject=shape.link,
-                    source=shape.geometry.source,
+                    element=Part(shape.link, shape.geometry.source),
                     message=f"part of the collision {shape.geometry.shape} of link {shape.link} "
                     f"inside of the visible robot: got {share:.0%}; expected at least "
                     f"{_MIN_SHARE_INSIDE:.0%}",

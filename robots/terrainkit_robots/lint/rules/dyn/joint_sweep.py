@@ -3,7 +3,7 @@
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.simulation.joint_sweep import SweepResult, joint_sweep
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.text import count
@@ -39,8 +39,7 @@ def unreachable_limits(robot: Facts) -> Violations:
         message = _joint_message(robot, result)
         if message:
             yield Violation(
-                subject=result.joint,
-                source=sources.get(result.joint, robot.model.source),
+                element=Part(result.joint, sources.get(result.joint, robot.model.source)),
                 severity="warning",
                 message=message,
                 measured={"share": round(result.share, 3), "load": round(result.load, 4)},

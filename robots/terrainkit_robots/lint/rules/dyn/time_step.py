@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.simulation.joint_units import PRISMATIC
+from terrainkit_robots.description.model import PRISMATIC
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import (
@@ -54,8 +54,10 @@ def low_joint_inertia(robot: Facts) -> Violations:
     is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE
     others = count(len(shares) - 1, "other joint")
     yield Violation(
-        subject=lightest,
-        source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
+        element=next(
+            (joint for joint in robot.joints if joint.name == lightest),
+            Part(lightest, robot.model.source),
+        ),
         severity="warning" if is_wrong else "note",
         message=f"largest stable time step of explicit PD on joint {lightest} (kp "
         f"{gain.stiffness:g}, kd {gain.damping:g}, {'mass' if units == PRISMATIC else 'inertia'} "

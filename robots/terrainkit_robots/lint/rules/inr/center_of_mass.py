@@ -4,7 +4,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import because_of, bodies_with_mass, mass_source
+from terrainkit_robots.analysis.inertia.inertial import because_of, bodies_with_mass, mass_part
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
@@ -44,8 +44,7 @@ def com_outside_body(robot: Facts) -> Violations:
         distance, limit = _distance(body.center, box), _max_distance(box)
         got, expected = contrast(distance, limit, ".3g")
         yield Violation(
-            subject=cause.name,
-            source=mass_source(cause),
+            element=mass_part(cause),
             severity="error" if distance > _COM_ERROR * limit else "warning",
             message=f"center of mass of body {body.name}: got {got} m outside of the "
             f"bounding box, whose diagonal is {2 * half_diagonal(box):.3g} m; expected at most "

@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.inertia.density import (
     check_min_density,
     has_derived_mass,
 )
-from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_source
+from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_part
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
@@ -29,8 +29,7 @@ def implausible_density(robot: Facts) -> Violations:
         mass = link.inertial.mass if link.inertial else None
         if mass is not None and mass >= MAX_INERTIA:
             yield Violation(
-                subject=link.name,
-                source=mass_source(link),
+                element=mass_part(link),
                 severity="error",
                 message=f"mass of link {link.name}: got {mass:.3g} kg; expected less than "
                 f"{MAX_INERTIA:.0e} kg",
@@ -48,8 +47,7 @@ def implausible_density(robot: Facts) -> Violations:
             density = body.mass / volume
             got, expected = ("at least", "at most") if density > limit else ("at most", "at least")
             yield Violation(
-                subject=body.name,
-                source=mass_source(body.main_link),
+                element=mass_part(body.main_link),
                 message=f"density of body {body.name}: got {got} {density:.3g} kg/m3 "
                 f"({body.mass:.3g} kg in {volume:.3g} m3); expected {expected} {limit:,.0f} kg/m3",
                 measured={"mass": body.mass, "volume": volume, "density": density},

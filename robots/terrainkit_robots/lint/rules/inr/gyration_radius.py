@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.analysis.inertia.inertial import (
     because_of,
     bodies_with_mass,
-    inertia_source,
+    inertia_part,
     main_cause,
     max_inertia,
 )
@@ -67,8 +67,7 @@ def inertia_too_large(robot: Facts) -> Violations:
         inertia = max_inertia(link)
         if inertia >= MAX_INERTIA:
             yield Violation(
-                subject=link.name,
-                source=inertia_source(link),
+                element=inertia_part(link),
                 severity="error",
                 message=f"inertia of link {link.name}: got {inertia:.3g} kg m2; expected less than "
                 f"{MAX_INERTIA:.0e} kg m2",
@@ -160,8 +159,7 @@ def _report_radius(
     half = half_diagonal(box)
     cause = main_cause(body)
     return Violation(
-        subject=cause.name,
-        source=inertia_source(cause),
+        element=inertia_part(cause),
         severity=severity,
         message=f"radius of gyration of body {body.name}: got {radius:.3g} m (mass "
         f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2); expected "

@@ -5,7 +5,7 @@ from collections.abc import Container, Mapping
 import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import inertia_source
+from terrainkit_robots.analysis.inertia.inertial import inertia_part
 from terrainkit_robots.analysis.inertia.physical import (
     MAX_INERTIA,
     MIN_INERTIA,
@@ -74,8 +74,7 @@ def not_positive_definite(robot: Facts) -> Violations:
         moments = principal_moments(inertia)
         if zero or moments[0] <= MIN_INERTIA:
             yield Violation(
-                subject=link.name,
-                source=inertia_source(link),
+                element=inertia_part(link),
                 severity="warning" if zero and is_kept else None,
                 message=f"principal moments of link {link.name}: got "
                 f"{numbers(moments, '.4g', ', ')} kg m2 "
@@ -95,8 +94,7 @@ def _missing_inertia(robot: Facts, link: Link) -> Violation:
         got = f"<inertia> without {', '.join(link.inertial.missing) or 'numbers'}"
         expected = "ixx, iyy and izz"
     return Violation(
-        subject=link.name,
-        source=inertia_source(link),
+        element=inertia_part(link),
         message=f"inertia of link {link.name} (mass {link.inertial.mass:.4g} kg): got {got}; "
         f"expected {expected}",
     )
@@ -144,8 +142,7 @@ def triangle_inequality(robot: Facts) -> Violations:
         severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "note"
         text = f"1 - {1 - ratio:.1g}" if ratio > 0.9999 else f"{ratio:.4g}"
         yield Violation(
-            subject=link.name,
-            source=inertia_source(link),
+            element=inertia_part(link),
             severity="error" if ratio < _MIN_TRIANGLE_RATIO else severity,
             message=f"principal moments of link {link.name}: got "
             f"{numbers(moments, '.4g', ', ')} kg m2 with (I1 + I2) / I3 = {text}; expected "
@@ -181,8 +178,7 @@ def placeholder_inertia(robot: Facts) -> Violations:
         bodies = f"{len(links)} of {massive} bodies ({listed})"
         parts = [body for body in robot.bodies if any(body.main_link is link for link in links)]
         yield Violation(
-            subject=first.name,
-            source=inertia_source(first),
+            element=inertia_part(first),
             severity="error" if any(is_far_too_large(robot, part) for part in parts) else "warning",
             message=f"inertia of {bodies if len(links) > 1 else f'body {listed}'}: got {got}; "
             f"expected {expected}",

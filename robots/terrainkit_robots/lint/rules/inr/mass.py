@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import default_mass
-from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, mass_source, max_inertia
+from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, mass_part, max_inertia
 from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast, names
 
 if TYPE_CHECKING:
@@ -42,14 +42,10 @@ def massless_body(robot: Facts) -> Violations:
     """
     for link in robot.model.links:
         inertial = link.inertial
-        if (
-            inertial
-            and inertial.mass is None
-            and not robot.unparsed.has(link.name, "value", "mass")
-        ):
+        has_no_mass = inertial is not None and inertial.mass is None
+        if has_no_mass and not robot.unparsed.has(link.name, "value", "mass"):
             yield Violation(
-                subject=link.name,
-                source=inertial.source,
+                element=mass_part(link),
                 message=f"<inertial> of link {link.name}: got no <mass>; expected <mass> and "
                 "<inertia>",
             )
@@ -63,8 +59,7 @@ def massless_body(robot: Facts) -> Violations:
             mass = f"{body.mass:.3g} kg" if declared else "no <inertial> on any of its links"
             parent = f"joint {body.joint.name} moves it" if body.joint else "it is the trunk"
             yield Violation(
-                subject=body.name,
-                source=mass_source(declared[0]) if declared else body.top.source,
+                element=Part(body.name, (mass_part(declared[0]) if declared else body.top).source),
                 message=f"mass of body {body.name} ({parent}): got {mass}; expected more than 0 kg",
                 measured={"mass": body.mass},
             )
@@ -83,8 +78,7 @@ def _links_without_mass(robot: Facts) -> Violations:
     for link, inertia in massless:
         if inertia > MIN_INERTIA:
             yield Violation(
-                subject=link.name,
-                source=mass_source(link),
+                element=mass_part(link),
                 severity="warning",
                 message=f"mass of link {link.name}: got 0 kg with an inertia of up to "
                 f"{inertia:.3g} kg m2; expected a mass above 0 kg, or no inertia",
@@ -98,8 +92,7 @@ def _links_without_mass(robot: Facts) -> Violations:
     for group, severity in groups:
         if group:
             yield Violation(
-                subject=group[0].name,
-                source=mass_source(group[0]),
+                element=mass_part(group[0]),
                 severity=severity,
                 message=f"mass of {names(link.name for link in group)}: got 0 kg; simulators that "
                 "do not merge fixed joints reject or replace it",
@@ -124,8 +117,7 @@ def negative_mass(robot: Facts) -> Violations:
         mass = link.inertial.mass if link.inertial else None
         if mass is not None and mass < 0:
             yield Violation(
-                subject=link.name,
-                source=mass_source(link),
+                element=mass_part(link),
                 message=f"mass of link {link.name}: got {mass:.6g} kg; expected 0 kg or more",
                 measured={"mass": mass},
             )
@@ -160,8 +152,7 @@ def mass_ratio(robot: Facts) -> Violations:
             continue
         ratio = heavy.mass / light.mass
         yield Violation(
-            subject=light.name,
-            source=mass_source(light.main_link),
+            element=mass_part(light.main_link),
             message=f"mass ratio of {heavy.name} ({heavy.mass:.4g} kg) and its neighbor "
             f"{light.name} ({light.mass:.3g} kg): got "
             f"{contrast(ratio, _MAX_MASS_RATIO, '.0f')[0]}; expected at most {_MAX_MASS_RATIO:.0f}",

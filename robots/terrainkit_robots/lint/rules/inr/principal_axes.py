@@ -4,7 +4,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import inertia_source
+from terrainkit_robots.analysis.inertia.inertial import inertia_part
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import numbers
@@ -73,8 +73,7 @@ def exchanged_axes(robot: Facts) -> Violations:
             continue  # parts beside the long axis raise the moment about it
         axis = "xyz"[long]
         yield Violation(
-            subject=link.name,
-            source=inertia_source(link),
+            element=inertia_part(link),
             message=f"moments of inertia of body {body.name}: got "
             f"{numbers(moments, '.3g', ', ')} kg m2 for a shape of "
             f"{numbers(size, '.3g', ' x ')} m; expected the smallest about {axis}, its "

@@ -2,7 +2,7 @@
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.passive_joints import OPEN_LINKAGE
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import count, names
 
 _MAX_COMMAND_RATIO = 4.0
@@ -44,16 +44,13 @@ def missing_actuator(robot: Facts) -> Violations:
         return
     for joint in robot.robot_joints:
         if joint.name not in actuated and joint.mimic is None and not joint.coupled:
-            reason = robot.passive_joints.get(joint.name)
+            expected = "expected 1"
+            if robot.passive_joints.get(joint.name) == OPEN_LINKAGE:
+                expected = f"{OPEN_LINKAGE}; expected an <equality> that closes the loop"
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",
-                message=f"actuators of joint {joint.name}: got 0"
-                + (
-                    f"; {reason}; expected an <equality> that closes the loop"
-                    if reason == OPEN_LINKAGE
-                    else "; expected 1"
-                ),
+                message=f"actuators of joint {joint.name}: got 0; {expected}",
             )
 
 
@@ -76,8 +73,7 @@ def zero_gear(robot: Facts) -> Violations:
     for actuator in robot.model.actuators:
         if actuator.joint and actuator.gear == 0:
             yield Violation(
-                subject=actuator.joint,
-                source=actuator.source,
+                element=Part(actuator.joint, actuator.source),
                 message=f"gear of the actuator of joint {actuator.joint}: got 0; expected 1 or "
                 "another ratio",
             )
@@ -110,8 +106,7 @@ def one_sided_motor(robot: Facts) -> Violations:
         is_one_sided = lower >= 0 or upper <= 0 or ends[1] > _MAX_COMMAND_RATIO * ends[0]
         if hinge and lower < upper and is_one_sided:
             yield Violation(
-                subject=actuator.joint,
-                source=actuator.source,
+                element=Part(actuator.joint, actuator.source),
                 severity=None if robot.legs else "note",
                 message=f"control range of the motor of joint {actuator.joint}: got {lower:g} to "
                 f"{upper:g}; expected both signs with similar values",
@@ -142,8 +137,7 @@ def unreachable_range(robot: Facts) -> Violations:
         reached = max(min(high, upper) - max(low, lower), 0.0) / (upper - lower)
         if reached < _MIN_REACHED:
             yield Violation(
-                subject=joint.name,
-                source=actuator.source,
+                element=Part(joint.name, actuator.source),
                 message=f"targets of the actuator of joint {joint.name}: got {low:.4g} to "
                 f"{high:.4g} {joint.unit}, {reached:.0%} of the range of {lower:.4g} to "
                 f"{upper:.4g} {joint.unit}; expected at least {_MIN_REACHED:.0%}",
@@ -173,8 +167,7 @@ def safety_controller(robot: Facts) -> Violations:
     if controllers:
         first, controller = controllers[0]
         yield Violation(
-            subject=first,
-            source=controller.source,
+            element=Part(first, controller.source),
             message=f"safety_controller of {names(name for name, _ in controllers)}: Genesis uses "
             "k_position as the stiffness of a position controller",
             measured={"joints": len(controllers)},

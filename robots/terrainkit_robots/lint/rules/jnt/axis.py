@@ -5,7 +5,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import SetAttribute, make_fix
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import count, numbers
 
 _MIN_AXIS_LENGTH = 1e-6
@@ -39,8 +39,7 @@ def zero_axis(robot: Facts) -> Violations:
         if short_axis and not robot.unparsed.at(joint.axis_source):
             assert joint.axis is not None
             yield Violation(
-                subject=joint.name,
-                source=joint.axis_source or joint.source,
+                element=Part(joint.name, joint.axis_source or joint.source),
                 message=f"axis of joint {joint.name}: got {numbers(joint.axis, '.9g')} or no "
                 "numbers; expected a direction such as 0 1 0",
             )
@@ -89,8 +88,7 @@ def unnormalized_axis(robot: Facts) -> Violations:
         source = joint.axis_source or joint.source
         edit = SetAttribute(source=source, name="xyz", value=numbers(joint.direction, ".9g"))
         yield Violation(
-            subject=joint.name,
-            source=source,
+            element=Part(joint.name, source),
             message=f"axis length of joint {joint.name}: got {length:.6g} "
             f"({numbers(joint.axis, '.9g')}); expected 1 +- {_MAX_AXIS_ERROR:g}",
             measured={"length": length},

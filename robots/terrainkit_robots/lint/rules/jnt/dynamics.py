@@ -1,7 +1,7 @@
 """Rules on damping, friction, armature and springs."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 # 6 of 536 published files exceed it, with a friction of 100 %: grippers that cannot move.
@@ -41,8 +41,7 @@ def negative_loss(robot: Facts) -> Violations:
             value = getattr(joint, name)
             if value < 0:
                 yield Violation(
-                    subject=joint.name,
-                    source=(joint.dynamics or joint).source,
+                    element=Part(joint.name, (joint.dynamics or joint).source),
                     message=f"{name} of joint {joint.name}: got {value:g}; expected 0 or more",
                     measured={name: value},
                 )
@@ -68,10 +67,9 @@ def excessive_friction(robot: Facts) -> Violations:
         limit = _MAX_LEG_FRICTION if joint.name in legs else _MAX_FRICTION
         if effort is None or effort <= 0 or joint.friction <= limit * effort:
             continue
-        share, unit = joint.friction / effort, joint.effort_unit
+        share, unit = joint.friction / effort, joint.units.effort
         yield Violation(
-            subject=joint.name,
-            source=(joint.dynamics or joint).source,
+            element=Part(joint.name, (joint.dynamics or joint).source),
             severity="error" if share > 1 else None,
             message=f"friction of joint {joint.name}: got {joint.friction:g} {unit}, {share:.0%} "
             f"of its effort limit of {effort:g} {unit}; expected at most {limit:.0%}",
@@ -105,8 +103,7 @@ def excessive_damping(robot: Facts) -> Violations:
             limit = max(min(limit, velocity), _MIN_SPEED_SHARE * velocity)
         if speed < limit:
             yield Violation(
-                subject=joint.name,
-                source=(joint.dynamics or joint).source,
+                element=Part(joint.name, (joint.dynamics or joint).source),
                 message=f"damping of joint {joint.name}: got {joint.damping:g} N m s/rad, which "
                 f"limits it to {speed:.3g} rad/s at its effort limit of {effort:g} N m; expected "
                 f"at least {limit:g} rad/s",

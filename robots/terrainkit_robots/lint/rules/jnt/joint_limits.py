@@ -4,7 +4,7 @@ import math
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Limit
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import contrast, names
 
 # 17 of 536 published files exceed it with placeholders of 3 turns to 1e16, and 4 with the rotation
@@ -71,8 +71,7 @@ def missing_limit(robot: Facts) -> Violations:
         error = _limit_error(joint, robot.model.kind == "mjcf")
         if error and not robot.unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
-                subject=joint.name,
-                source=(joint.limit or joint).source,
+                element=Part(joint.name, (joint.limit or joint).source),
                 message=f"limits of {joint.kind} joint {joint.name}: got {error}; expected lower "
                 "< upper",
             )
@@ -122,8 +121,7 @@ def inverted_limits(robot: Facts) -> Violations:
         lower, upper = _limits(joint.limit)
         if lower > upper and not robot.unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
+                element=Part(joint.name, joint.limit.source),
                 message=f"limits of joint {joint.name}: got {lower:g} to {upper:g} {joint.unit}; "
                 "expected lower < upper",
                 measured={"lower": lower, "upper": upper},
@@ -151,8 +149,7 @@ def wide_range(robot: Facts) -> Violations:
         if upper - lower > _MAX_RANGE:
             turns, _ = contrast((upper - lower) / (2 * math.pi), 2.0, ".3g")
             yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
+                element=Part(joint.name, joint.limit.source),
                 message=f"range of joint {joint.name}: got {turns} "
                 f"turns ({lower:g} to {upper:g} rad); expected at most 2 turns",
                 measured={"lower": lower, "upper": upper},
@@ -178,8 +175,7 @@ def zero_outside_limits(robot: Facts) -> Violations:
         assert first.limit is not None
         lower, upper = _limits(first.limit)
         yield Violation(
-            subject=first.name,
-            source=first.limit.source,
+            element=Part(first.name, first.limit.source),
             message=f"limits of {names(joint.name for joint in outside)}: got a range without "
             f"{first.reference:g} ({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); start "
             "from the default pose",
@@ -254,8 +250,7 @@ def narrow_range(robot: Facts) -> Violations:
     for joint, limits in narrow.items():
         size = limits[1] - limits[0]
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             severity=None if joint.name in warned else "note",
             message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
             f"{limits[1]:.3g}), which is {math.degrees(size):.3g} after a second conversion; "
@@ -286,8 +281,7 @@ def shifted_range(robot: Facts) -> Violations:
         if abs(middle) <= _MAX_SHIFT or limits[0] <= joint.reference <= limits[1]:
             continue
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             message=f"limits of joint {joint.name}: got {limits[0]:.4g} to {limits[1]:.4g} rad, "
             f"with their middle {abs(middle):.3g} rad from zero; expected at most half a turn",
             measured={"lower": limits[0], "upper": limits[1]},

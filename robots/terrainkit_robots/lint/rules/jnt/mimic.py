@@ -2,7 +2,7 @@
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 
 @rule("JNT013", "invalid-mimic", "error", onboarding="blocks")
@@ -37,8 +37,7 @@ def invalid_mimic(robot: Facts) -> Violations:
             got = f"{target.name}, in the cycle {' -> '.join(cycle[:10])}"
         elif joint.mimic.multiplier == 0 and not robot.unparsed.has(joint.name, "multiplier"):
             yield Violation(
-                subject=joint.name,
-                source=joint.mimic.source,
+                element=Part(joint.name, joint.mimic.source),
                 severity="warning",
                 message=f"multiplier of the mimic of joint {joint.name}: got 0, which holds the "
                 "joint still; expected another ratio, or a fixed joint",
@@ -47,8 +46,7 @@ def invalid_mimic(robot: Facts) -> Violations:
         else:
             continue
         yield Violation(
-            subject=joint.name,
-            source=joint.mimic.source,
+            element=Part(joint.name, joint.mimic.source),
             message=f"mimic target of joint {joint.name}: got {got}; expected a joint that is "
             "driven",
         )

@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.passive_joints import OPEN_LINKAGE
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Actuator, Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 # 46 of 536 published files have placeholders, with 1,000 to 50,000.
 _MAX_EFFORT = 1000.0
@@ -59,15 +59,14 @@ def missing_effort(robot: Facts) -> Violations:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
     for joint, effort in _missing_limits(robot, "effort"):
-        unit = joint.effort_unit
+        unit = joint.units.effort
         reason = robot.passive_joints.get(joint.name)
         if reason:
             is_open = reason == OPEN_LINKAGE
             expected = "a closed loop, or a fixed joint" if is_open else "a motor, unless by design"
             if joint.mimic is None:
                 yield Violation(
-                    subject=joint.name,
-                    source=(joint.limit or joint).source,
+                    element=Part(joint.name, (joint.limit or joint).source),
                     severity="warning" if is_open else "note",
                     certainty="likely",
                     message=f"effort limit of joint {joint.name}: got {effort or 0:g} {unit}, as "
@@ -76,8 +75,7 @@ def missing_effort(robot: Facts) -> Violations:
                 )
             continue
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             severity="warning" if effort is None else None,
             message=f"effort limit of joint {joint.name}: got "
             f"{'no number' if effort is None else f'{effort:g} {unit}'}; expected the peak "
@@ -127,12 +125,11 @@ def missing_velocity(robot: Facts) -> Violations:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
     for joint, velocity in _missing_limits(robot, "velocity"):
-        unit = joint.speed_unit
+        unit = joint.units.velocity
         is_passive = joint.name in robot.passive_joints
         speed = "largest speed of the part" if is_passive else "no-load speed of the motor"
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             message=f"velocity limit of joint {joint.name}: got "
             f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
             f"{speed} [{unit}]",
@@ -168,8 +165,8 @@ def placeholder_limit(robot: Facts) -> Violations:
         assert joint.limit is not None
         max_velocity = _MAX_SPIN_VELOCITY if joint.kind == "continuous" else _MAX_VELOCITY
         limits = {
-            "effort": (joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
-            "velocity": (joint.limit.velocity, max_velocity, joint.speed_unit),
+            "effort": (joint.limit.effort, max_effort[joint.units.effort], joint.units.effort),
+            "velocity": (joint.limit.velocity, max_velocity, joint.units.velocity),
         }
         too_large = {
             name: (value, most, unit)
@@ -180,8 +177,7 @@ def placeholder_limit(robot: Facts) -> Violations:
             got = " and ".join(f"{value:g} {unit}" for value, _, unit in too_large.values())
             expected = " and ".join(f"{most:.4g} {unit}" for _, most, unit in too_large.values())
             yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
+                element=Part(joint.name, joint.limit.source),
                 message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}; "
                 f"expected less than {expected} for a robot of {robot.total_mass:.4g} kg",
                 measured={name: value for name, (value, _, _) in too_large.items()},
@@ -221,8 +217,7 @@ def oversized_effort(robot: Facts) -> Violations:
         if effort >= max(1000.0, weight * robot.body_bounds.robot_size):
             continue  # reported by JNT011
         yield Violation(
-            subject=joint.name,
-            source=geared.source if geared else (joint.limit or joint).source,
+            element=Part(joint.name, geared.source if geared else (joint.limit or joint).source),
             severity="note" if robot.model.kind == "mjcf" and not geared else None,
             message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
             f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
@@ -259,8 +254,7 @@ def low_velocity_limit(robot: Facts) -> Violations:
             continue
         if 0 < velocity < _MIN_LEG_VELOCITY:
             yield Violation(
-                subject=joint.name,
-                source=(joint.limit or joint).source,
+                element=Part(joint.name, (joint.limit or joint).source),
                 message=f"velocity limit of leg joint {joint.name}: got {velocity:g} rad/s; "
                 f"expected at least {_MIN_LEG_VELOCITY:g} rad/s",
                 measured={"velocity": velocity},

@@ -4,7 +4,7 @@ import math
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast
 
 # The two published files with an error need 166 % and 270 %.
@@ -55,11 +55,10 @@ def insufficient_torque(robot: Facts) -> Violations:
         raise CannotCheckError(f"the mass or joint of {finding.subject} is probably wrong")
     named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
-        share, unit = torque / effort, joint.effort_unit
+        share, unit = torque / effort, joint.units.effort
         got, expected = contrast(share, _MAX_LOAD, ".0%")
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             severity="error" if share > _MAX_LOAD_ERROR and named else "warning",
             message=f"static load of joint {joint.name} at the standing pose: got {torque:.3g} "
             f"{unit}, {got} of its effort limit of {effort:.4g} {unit}; expected at most "
@@ -89,8 +88,7 @@ def weak_position_gain(robot: Facts) -> Violations:
         if not stiffness or not _MAX_SAG * stiffness < torque < math.inf:
             continue
         yield Violation(
-            subject=actuator.joint,
-            source=actuator.source,
+            element=Part(actuator.joint, actuator.source),
             message=f"gain of the position actuator of joint {actuator.joint}: got {stiffness:g} "
             f"N m/rad, which needs an error of {torque / stiffness:.3g} rad for the "
             f"{torque:.3g} N m of standing; expected at most {_MAX_SAG:g} rad",

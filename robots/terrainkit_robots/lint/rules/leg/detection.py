@@ -7,7 +7,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import mean_length
 from terrainkit_robots.analysis.legs.limbs import Limb
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 _LEG_COUNTS = (2, 4, 6, 8)
@@ -82,19 +82,20 @@ def leg_count(robot: Facts) -> Violations:
     """
     count = len(robot.legs)
     uncounted = _uncounted_legs(robot)
+    measured = {"legs": count}
+    expected = "2, 4, 6 or 8"
     if uncounted:
-        yield Violation(
-            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
-            f"expected {count + len(uncounted)}, since {names(uncounted)} have the joints and "
-            "masses of a leg, but do not end near the ground; check that z points up",
-            measured={"legs": count, "uncounted": len(uncounted)},
+        measured["uncounted"] = len(uncounted)
+        expected = (
+            f"{count + len(uncounted)}, since {names(uncounted)} have the joints and masses of a "
+            "leg, but do not end near the ground; check that z points up"
         )
-    elif len(robot.limbs) > 1 and count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
-        yield Violation(
-            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
-            "expected 2, 4, 6 or 8",
-            measured={"legs": count},
-        )
+    elif len(robot.limbs) <= 1 or count + len(_inverted_legs(robot)) in _LEG_COUNTS:
+        return
+    feet = ", ".join(leg.foot for leg in robot.legs)
+    yield Violation(
+        message=f"number of legs: got {count} ({feet}); expected {expected}", measured=measured
+    )
 
 
 def _uncounted_legs(robot: Facts) -> list[str]:
@@ -161,8 +162,7 @@ def leg_points_up(robot: Facts) -> Violations:
         rise = float(limb.tip[2] - start[2])
         reach = float(np.linalg.norm(limb.tip - start))
         yield Violation(
-            subject=leaf.name,
-            source=first.source,
+            element=Part(leaf.name, first.source),
             message=f"height of the end of leg {leaf.name} above joint {first.name}, all joints at "
             f"zero: got {rise:.3f} m, {rise / reach:.0%} of their distance of {reach:.3f} m; "
             f"expected less than {_MAX_RISE:.0%}, and below 0 as for the other legs",

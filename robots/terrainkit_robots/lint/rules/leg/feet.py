@@ -3,7 +3,7 @@
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import SetAttribute, make_fix
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 
@@ -37,8 +37,7 @@ def foot_collapsed(robot: Facts) -> Violations:
         SetAttribute(source=joint.source, name="dont_collapse", value="true") for _, joint in merged
     ]
     yield Violation(
-        subject=foot,
-        source=first.source,
+        element=Part(foot, first.source),
         message=f"fixed joints above the feet ({joints}): got no dont_collapse; expected "
         'dont_collapse="true", or Isaac Gym merges the feet into their parents',
         measured={"feet": len(merged)},

@@ -2,7 +2,7 @@
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.replacement import MAX_STL_FACES, count_faces
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import FLAT, thickness
 
@@ -30,8 +30,7 @@ def flat_mesh(robot: Facts) -> Violations:
             vertices = robot.meshes.vertices(use.mesh)
             relative = thickness(vertices)
             yield Violation(
-                subject=used.name,
-                source=use.mesh.source,
+                element=Part(used.name, use.mesh.source),
                 message=f"thickness of {used.label} over its diagonal: got {relative:.2g}; "
                 f"expected at least {FLAT:g}",
                 measured={"corners": len(vertices), "thickness": relative},
@@ -68,8 +67,7 @@ def nonconvex_collision(robot: Facts) -> Violations:
             continue
         if hull > _MAX_HULL_RATIO * solid:
             yield Violation(
-                subject=used.name,
-                source=first.mesh.source,
+                element=Part(used.name, first.mesh.source),
                 message=f"volume of the convex hull of {used.label}: got {hull:.3g} m3, "
                 f"{hull / solid:.3g} times the volume of the mesh; expected at most "
                 f"{_MAX_HULL_RATIO:g} times",

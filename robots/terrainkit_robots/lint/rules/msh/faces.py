@@ -14,7 +14,7 @@ from terrainkit_robots.analysis.meshes.replacement import (
 )
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
 from terrainkit_robots.description.fix import Edit, make_fix
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
 
 
@@ -89,8 +89,7 @@ def dense_collision_mesh(robot: Facts) -> Violations:
         if robot.model.kind == "urdf" and used.mesh.path.suffix.lower() not in MUJOCO_SUFFIXES:
             continue  # MSH005 converts it to a hull
         yield Violation(
-            subject=used.name,
-            source=used.collisions[0].mesh.source,
+            element=Part(used.name, used.collisions[0].mesh.source),
             message=f"number of faces of {used.label}: got {faces:,}; expected at most "
             f"{MAX_COLLISION_FACES:,}",
             measured={"faces": faces},

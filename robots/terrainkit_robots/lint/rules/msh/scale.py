@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.meshes.scale import (
     MeshScales,
     ScaleMismatch,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import numbers
 
 
@@ -42,8 +42,7 @@ def wrong_scale(robot: Facts) -> Violations:
                 continue
             is_large = mismatch.ratio > 1
             yield Violation(
-                subject=used.name,
-                source=use.mesh.scale_source or use.mesh.source,
+                element=Part(used.name, use.mesh.scale_source or use.mesh.source),
                 message=f"size of mesh {used.name} on link {use.link.name}: got "
                 f"{mismatch.diagonal:.3g} m, {mismatch.ratio:.3g} times the "
                 f"{mismatch.reference:.3g} m {mismatch.description}; expected "
@@ -89,8 +88,7 @@ def negative_scale(robot: Facts) -> Violations:
         is_harmful = first.is_collision and robot.model.kind != "mjcf"
         scale = numbers(first.mesh.scale)
         yield Violation(
-            subject=used.name,
-            source=first.mesh.scale_source or first.mesh.source,
+            element=Part(used.name, first.mesh.scale_source or first.mesh.source),
             message=f"scale of {used.label}: got {scale}; expected values > 0",
             severity="warning" if is_harmful else "note",
         )

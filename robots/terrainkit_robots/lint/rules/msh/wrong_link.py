@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Geometry, Link
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 _SUFFIX = re.compile(r"[_-]?(link|body|visual|collision|vis|col|\d+)$", re.IGNORECASE)
 
@@ -70,8 +70,7 @@ def mesh_of_another_link(robot: Facts) -> Violations:
             if not owners or not has_own or has_both:
                 continue
             yield Violation(
-                subject=link.name,
-                source=geometry.source,
+                element=Part(link.name, geometry.source),
                 message=f"{kind} mesh of link {link.name}: got {_stem(geometry)}, the mesh of link "
                 f"{owners[0]}; expected {_own_stem(geometry, link)}, which exists",
             )
@@ -124,8 +123,7 @@ def odd_leg_mesh(robot: Facts) -> Violations:
             odd_one = next(s for s in shapes[wrong] if _stem(s.geometry) in got)
             others = [robot.bodies[bodies[k]].name for k in range(4) if found[k] == common]
             yield Violation(
-                subject=odd_one.link,
-                source=odd_one.geometry.source,
+                element=Part(odd_one.link, odd_one.geometry.source),
                 message=f"{kind[:-1]} mesh of {odd_one.link}: got {', '.join(got)}; expected "
                 f"{', '.join(expected)}, or one mesh for all legs, as "
                 f"{', '.join(others)} share {', '.join(shared)} and only "
@@ -153,8 +151,7 @@ def _meshes_of_other_joints(robot: Facts, chains: Sequence[Sequence[int]]) -> Vi
             wrong = next(s for s in getattr(body, kind) if _stem(s.geometry) == stem)
             owner = robot.bodies[chains[leg][others[position]]]
             yield Violation(
-                subject=wrong.link,
-                source=wrong.geometry.source,
+                element=Part(wrong.link, wrong.geometry.source),
                 message=f"{kind[:-1]} mesh of {wrong.link}: got {stem}, which {len(places) - 1} "
                 f"legs have at {owner.name} instead; expected another mesh",
             )

@@ -4,7 +4,7 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.name_words import MAX_NAME_LENGTH, split_name
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 _SHORT_SIDES = {"left": "l", "right": "r"}
 
@@ -41,8 +41,7 @@ def actuator_of_another_joint(robot: Facts) -> Violations:
             named = swap_sides(actuator.joint)
         if named is not None:
             yield Violation(
-                subject=actuator.joint,
-                source=actuator.source,
+                element=Part(actuator.joint, actuator.source),
                 message=f"joint of actuator {truncate(actuator.name)}: got {actuator.joint}; "
                 f"expected {named}, as its name says",
                 measured={"expected": named},

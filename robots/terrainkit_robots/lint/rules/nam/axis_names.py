@@ -7,7 +7,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.name_words import split_name
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 _MIN_COSINE = 0.5
 """Cosine from which a leg bends about the lateral axis."""
@@ -52,8 +52,7 @@ def wrong_axis_name(robot: Facts) -> Violations:
                 reported.add(joint.name)
                 best = max(cosines, key=cosines.__getitem__)
                 yield Violation(
-                    subject=joint.name,
-                    source=joint.axis_source or joint.source,
+                    element=Part(joint.name, joint.axis_source or joint.source),
                     message=f"axis of joint {joint.name}: got {best} "
                     f"({math.degrees(math.acos(cosines[word])):.0f} deg from {word}); "
                     f"expected {word}, as its name says",

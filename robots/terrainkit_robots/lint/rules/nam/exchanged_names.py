@@ -8,6 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.name_words import MAX_NAME_LENGTH, split_name
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import group
 
 _GENERIC = frozenset({"joint", "link", "body"})
 """Words that tell joints and links apart, but not one joint from another."""
@@ -50,10 +51,7 @@ def _words(name: str) -> frozenset[str]:
 
 def _unlike_other_legs(robot: Facts) -> Iterator[tuple[Joint, Joint, str]]:
     """Yield two joints of a leg that are named like each other's counterparts in most legs."""
-    by_length: dict[int, list[tuple[Joint, ...]]] = {}
-    for leg in robot.legs:
-        by_length.setdefault(len(leg.joints), []).append(leg.joints)
-    for legs in by_length.values():
+    for legs in group((len(leg.joints), leg.joints) for leg in robot.legs).values():
         counts = [
             Counter(w for joint in place for w in _words(joint.name))
             for place in zip(*legs, strict=True)
@@ -73,9 +71,7 @@ def _unlike_other_legs(robot: Facts) -> Iterator[tuple[Joint, Joint, str]]:
 def _unlike_children(robot: Facts) -> Iterator[tuple[Joint, Joint, str]]:
     """Yield two joints of which each is named after the child link of the other one."""
     joints = robot.robot_joints
-    named: dict[frozenset[str], list[Joint]] = {}
-    for joint in joints:
-        named.setdefault(_words(joint.name), []).append(joint)
+    named = group((_words(joint.name), joint) for joint in joints)
     regular = sum(_words(joint.child) == _words(joint.name) for joint in joints)
     if regular < _MIN_NAMED_AFTER_CHILD * len(joints):
         return

@@ -37,7 +37,13 @@ def invalid_name(robot: Facts) -> Violations:
     for kind, items in kinds:
         conflicts = _conflicts(items)
         for valid, same in conflicts.items():
-            yield _conflict_violation(kind, valid, same)
+            yield Violation(
+                element=same[1],
+                message=f"names of {kind} {names(item.name for item in same)}: USD renames all of "
+                f"them to {truncate(valid)}; expected names that stay different",
+                severity="error",
+                measured={"names": len(same)},
+            )
         reported = {item.name for same in conflicts.values() for item in same}
         for item in items:
             if item.name not in reported and not _IDENTIFIER.fullmatch(item.name):
@@ -68,13 +74,3 @@ def _conflicts(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
     for item in items:
         groups.setdefault(_valid(item.name), {}).setdefault(item.name, item)
     return {valid: list(same.values()) for valid, same in groups.items() if len(same) > 1}
-
-
-def _conflict_violation(kind: str, valid: str, same: Sequence[Link | Joint]) -> Violation:
-    return Violation(
-        element=same[1],
-        message=f"names of {kind} {names(item.name for item in same)}: USD renames all of them to "
-        f"{truncate(valid)}; expected names that stay different",
-        severity="error",
-        measured={"names": len(same)},
-    )

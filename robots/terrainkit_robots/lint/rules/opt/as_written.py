@@ -8,7 +8,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Link
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.simulation.written_model import (
     WrittenStand,
     make_written_model,
@@ -87,11 +87,15 @@ def _consequence(
         for result in (stand, without)
     )
     yield Violation(
-        element=link,
-        source=None if link or robot.model.options is None else robot.model.options.source,
+        element=link or _options(robot),
         message=f"{what}: when the robot stands, {got}; expected {expected}, with which {other}",
         measured={n: round(v, 4) for n in found if math.isfinite(v := getattr(stand, n))},
     )
+
+
+def _options(robot: Facts) -> Part:
+    """Return the <option> of a file, or its root element without one."""
+    return Part(robot.model.title, (robot.model.options or robot.model).source)
 
 
 def _link(robot: Facts, body: int) -> Link | None:
@@ -255,7 +259,7 @@ def contact_solver(robot: Facts) -> Violations:
     yield from found
     if not found and solver != "Newton" and iterations < _MIN_ITERATIONS:
         yield Violation(
-            source=robot.model.options.source if robot.model.options else None,
+            element=_options(robot),
             severity="note",
             message=f"{what}; expected at least {_MIN_ITERATIONS}, or Newton",
             measured={"iterations": iterations},

@@ -2,7 +2,7 @@
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
 
 _MAX_GRAVITY_ERROR = 0.2
@@ -50,7 +50,7 @@ def wrong_gravity(robot: Facts) -> Violations:
     if points_down and abs(z + 100 * GRAVITY) < 1:
         return  # the unit of length is the centimeter, as for insects
     yield Violation(
-        source=options.source,
+        element=Part(robot.model.title, options.source),
         severity="warning" if points_down or is_part else None,
         message=f"gravity{', which is disabled' if off else ''}: got {x:g} {y:g} {z:g} m/s2; "
         f"expected 0 0 {-GRAVITY:g} m/s2",
@@ -75,7 +75,7 @@ def implausible_time_step(robot: Facts) -> Violations:
     if options is None or _MIN_TIME_STEP <= options.timestep <= _MAX_TIME_STEP:
         return
     yield Violation(
-        source=options.source,
+        element=Part(robot.model.title, options.source),
         message=f"time step: got {options.timestep:g} s; expected {_MIN_TIME_STEP:g} s to "
         f"{_MAX_TIME_STEP:.2g} s",
         measured={"timestep": options.timestep},
@@ -102,7 +102,7 @@ def disabled_physics(robot: Facts) -> Violations:
     if disabled:
         effects = "; ".join(_CONSEQUENCES[name] for name in disabled)
         yield Violation(
-            source=options.source,
+            element=Part(robot.model.title, options.source),
             severity=None if _FATAL & set(disabled) else "warning",
             message=f"flags of <option>: got {names(disabled)} disabled ({effects}); expected "
             "enable",

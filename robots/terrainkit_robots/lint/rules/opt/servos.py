@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import joint_inertia
 from terrainkit_robots.simulation.written_model import make_written_model, position_servos
@@ -62,11 +62,9 @@ def _servos(model: Any) -> Iterator[_Servo]:
         )
 
 
-def _source(robot: Facts, joint: str) -> dict[str, Any]:
-    source = next(
-        (actuator.source for actuator in robot.model.actuators if actuator.joint == joint), None
-    )
-    return {"subject": joint, "source": source}
+def _actuator(robot: Facts, joint: str) -> Part:
+    sources = {actuator.joint: actuator.source for actuator in reversed(robot.model.actuators)}
+    return Part(joint, sources.get(joint, robot.model.source))
 
 
 def _others(joints: int) -> str:
@@ -97,7 +95,7 @@ def undamped_position_gain(robot: Facts) -> Violations:
         worst = min(loose, key=lambda servo: found[servo])
         frequency = math.sqrt(worst.stiffness / inertias[worst.joint].free) / (2 * math.pi)
         yield Violation(
-            **_source(robot, worst.joint),
+            element=_actuator(robot, worst.joint),
             message=f"damping of the position actuator of joint {worst.joint}: got "
             f"{worst.damping:g} N m s/rad with a gain of {worst.stiffness:g} N m/rad, "
             f"{found[worst]:.1%} of critical damping; expected at least {_MIN_DAMPING_RATIO:.0%}; "
@@ -124,7 +122,7 @@ def excessive_control_range(robot: Facts) -> Violations:
         worst = max(found, key=lambda servo: servo.excess)
         low, high = worst.commands
         yield Violation(
-            **_source(robot, worst.joint),
+            element=_actuator(robot, worst.joint),
             message=f"ctrlrange of the position actuator of joint {worst.joint}: got {low:g} to "
             f"{high:g} rad, {worst.excess:.3g} rad beyond the limits of the joint; expected at "
             f"most {_MAX_EXCESS:.2g} rad" + _others(len(found)),

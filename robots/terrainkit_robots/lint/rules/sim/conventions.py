@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import UNITS, Violation, Violations, rule
+from terrainkit_robots.lint.rule import UNITS, Part, Violation, Violations, rule
 from terrainkit_robots.text import conjunction
 
 _MAX_JOINTS = 40
@@ -98,12 +98,9 @@ def merged_feet(robot: Facts) -> Violations:
     more = ", ..." if len(merges) > 1 else ""
     verb = "merges" if len(by) == 1 else "merge"
     yield Violation(
-        subject=foot,
-        source=robot.tree.parent_joint[foot].source,
-        message=(
-            f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
-            f"({foot} into {next(iter(bodies.values()))}{more})"
-        ),
+        element=Part(foot, robot.tree.parent_joint[foot].source),
+        message=f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
+        f"({foot} into {next(iter(bodies.values()))}{more})",
         hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
     )
@@ -164,7 +161,7 @@ def genesis_armature(robot: Facts) -> Violations:
     if not slowed:
         return
     joint = min(moved, key=moved.__getitem__)
-    unit = "kg" if joint.kind == "prismatic" else "kg m2"
+    unit = joint.units.inertia
     yield Violation(
         element=joint,
         message=f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia "

@@ -9,7 +9,15 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Source
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
+from terrainkit_robots.lint.rule import (
+    Element,
+    Part,
+    Severity,
+    Violation,
+    Violations,
+    findings_of,
+    rule,
+)
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
@@ -171,16 +179,15 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
 def _load_failure(
     robot: Facts, loader: str, refusal: "LoadError", code: str, *, severity: Severity
 ) -> Violation:
-    sources = {link.name: link.source for link in robot.model.links}
-    sources = {joint.name: joint.source for joint in robot.model.joints} | sources
-    source = sources.get(refusal.element) if refusal.element else None
-    element = f" ({names([refusal.element])})" if refusal.element else ""
-    if source is None and refusal.line:
+    parts: tuple[Element, ...] = (*robot.model.joints, *robot.model.links)
+    elements = {part.name: part for part in parts if part.name}
+    source = robot.model.source
+    if refusal.line:
         source = Source(file=robot.model.file, line=refusal.line)
+    suffix = f" ({names([refusal.element])})" if refusal.element else ""
     return Violation(
-        subject=refusal.element if refusal.element in sources else robot.model.title,
-        source=source or robot.model.source,
-        message=f"{loader} cannot load the file: {truncate(refusal.message, 200)}{element}",
+        element=elements.get(refusal.element) or Part(robot.model.title, source),
+        message=f"{loader} cannot load the file: {truncate(refusal.message, 200)}{suffix}",
         hint=f"See rule {code}." if code else "",
         severity=severity,
     )

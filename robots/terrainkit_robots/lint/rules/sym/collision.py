@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Geometry, Link
-from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import names, numbers
 from terrainkit_robots.transforms import Matrix
 
@@ -65,15 +65,11 @@ def collision_asymmetry(robot: Facts) -> Violations:
             continue
 
         def extent(body: Body) -> Matrix | None:
-            if body.joint is None:
-                return None
-            box = bounds(body.collisions, robot.meshes)
-            return None if box is None else box.ravel()
+            return None if body.joint is None else bounds(body.collisions, robot.meshes)
 
         odd, other, reason = robot.outlier_first(pair, extent, partial(_visual_offset, robot))
         yield Violation(
-            subject=odd.body.name,
-            source=odd.body.collisions[0].geometry.source,
+            element=Part(odd.body.name, odd.body.collisions[0].geometry.source),
             message=f"bounding box of the collision shapes of {odd.body.name}: got a face "
             f"{1000 * error:.3g} mm from its mirror image {other.body.name}; expected at most "
             f"{1000 * limit:.3g} mm; {reason}",
@@ -130,8 +126,7 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
         odd, other, reason = robot.outlier_first(pair, size)
         own, mirrored = (left, right) if odd is pair.left else (right, left)
         return Violation(
-            subject=odd.body.name,
-            source=own.size_source or own.source,
+            element=Part(odd.body.name, own.size_source or own.source),
             message=f"size of the collision {own.shape} of {odd.body.name}: got "
             f"{numbers(own.size)} m, and {numbers(mirrored.size)} m for its mirror image "
             f"{other.body.name} (radii and half lengths); expected at most a factor of "

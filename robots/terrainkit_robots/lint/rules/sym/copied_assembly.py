@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     has_valid_masses,
     max_com_error,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 
 @rule("SYM008", "copied-assembly", "note")
@@ -41,8 +41,7 @@ def copied_assembly(robot: Facts) -> Violations:
     if differing:
         first = copied[0]
         yield Violation(
-            subject=first.left.body.name,
-            source=first.left.body.top.source,
+            element=Part(first.left.body.name, first.left.body.top.source),
             message=f"assemblies on both sides: got {len(copied)} equal pairs of bodies, from "
             f"{first.left.body.name} and {first.right.body.name} on; {len(differing)} of them are "
             "not mirror images",

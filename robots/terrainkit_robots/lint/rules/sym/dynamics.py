@@ -5,7 +5,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.transforms import Matrix
 
 _MAX_RATIO = 5.0
@@ -50,8 +50,7 @@ def loss_asymmetry(robot: Facts) -> Violations:
             odd, other, reason = robot.outlier_first(pair, value)
             own, mirrored = getattr(odd.joint, name), getattr(other.joint, name)
             yield Violation(
-                subject=odd.joint.name,
-                source=(odd.joint.dynamics or odd.joint).source,
+                element=Part(odd.joint.name, (odd.joint.dynamics or odd.joint).source),
                 message=f"{name} of joint {odd.joint.name}: got {own:g}, and {mirrored:g} for its "
                 f"mirror image {other.joint.name}; expected at most a factor of {_MAX_RATIO:g}; "
                 f"{reason}",
@@ -95,8 +94,7 @@ def gear_asymmetry(robot: Facts) -> Violations:
         if gears[odd.joint.name].gear > 0:
             odd, other = other, odd
         yield Violation(
-            subject=odd.joint.name,
-            source=gears[odd.joint.name].source,
+            element=Part(odd.joint.name, gears[odd.joint.name].source),
             message=f"gear of the actuator of joint {odd.joint.name}: got "
             f"{gears[odd.joint.name].gear:g}, and {gears[other.joint.name].gear:g} for its mirror "
             f"image {other.joint.name}; expected the same sign",

@@ -6,7 +6,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import inertia_source
+from terrainkit_robots.analysis.inertia.inertial import inertia_part
 from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     MAX_MASS_DIFFERENCE,
     com_error,
@@ -69,8 +69,7 @@ def inertia_asymmetry(robot: Facts) -> Violations:
         odd, other, reason = robot.outlier_first(pair, lambda body: body.principal)
         moments = [numbers(side.body.principal, ".4g", ", ") for side in (odd, other)]
         yield Violation(
-            subject=odd.body.name,
-            source=inertia_source(odd.body.main_link),
+            element=inertia_part(odd.body.main_link),
             message=f"principal moments of body {odd.body.name}: got {moments[0]} kg m2, and "
             f"{moments[1]} kg m2 for its mirror image {other.body.name}: "
             f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
@@ -141,10 +140,9 @@ def product_asymmetry(robot: Facts) -> Violations:
         error = float(np.abs(reflection @ a @ reflection - b).max()) / largest
         if error <= _MAX_PRODUCT_ERROR or moments > _MAX_MOMENT_ERROR:
             continue
-        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia.ravel())
+        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia)
         yield Violation(
-            subject=odd.body.name,
-            source=inertia_source(odd.body.main_link),
+            element=inertia_part(odd.body.main_link),
             message=f"inertia of body {odd.body.name} in the axes of the trunk: got {error:.0%} "
             f"of its largest moment between it and the mirrored one of {other.body.name}; "
             f"expected at most {_MAX_PRODUCT_ERROR:.0%}; {reason}",
@@ -166,8 +164,7 @@ def _turned_trunk(robot: Facts) -> Violations:
     share = float(np.linalg.norm(row - (row @ normal) * normal) / trunk.principal[2])
     if share > _MAX_PRODUCT_ERROR:
         yield Violation(
-            subject=trunk.name,
-            source=inertia_source(trunk.main_link),
+            element=inertia_part(trunk.main_link),
             message=f"products of inertia of trunk {trunk.name} with the mirrored axis: got "
             f"{share:.0%} of its largest moment; expected at most {_MAX_PRODUCT_ERROR:.0%}",
             measured={"share": share},

@@ -18,7 +18,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     limits_match,
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
-from terrainkit_robots.lint.rule import Measured, Violation, Violations, findings_of, rule
+from terrainkit_robots.lint.rule import Measured, Part, Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import check_joint_types
 from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix
@@ -69,8 +69,7 @@ def joint_axis_asymmetry(robot: Facts) -> Violations:
             continue
         reported.add(joint.name)
         yield Violation(
-            subject=joint.name,
-            source=joint.axis_source or joint.source,
+            element=Part(joint.name, joint.axis_source or joint.source),
             message=f"axis of joint {joint.name} in the trunk frame: got "
             f"{_format_axis(found.axis)}; expected the direction of the same joint of all "
             f"{found.others} other legs, such as {_format_axis(found.expected_axis)}, or mirrored "
@@ -120,8 +119,7 @@ def _report_axis(
 ) -> Violation:
     joint = right.joint
     return Violation(
-        subject=joint.name,
-        source=joint.axis_source or joint.source,
+        element=Part(joint.name, joint.axis_source or joint.source),
         message=f"axis of joint {joint.name} in the trunk frame: {message}",
         measured={**measured, "mirror_image": left.joint.name},
     )
@@ -140,7 +138,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         return body.joint.direction if body.joint else None
 
     def rotation(body: Body) -> Matrix:
-        return body.origin[:3, :3].ravel()
+        return body.origin[:3, :3]
 
     value = axis if error.is_axis else position if error.distance else rotation
 
@@ -168,8 +166,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         )
     source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
     return Violation(
-        subject=name,
-        source=source,
+        element=Part(name, source),
         message=f"{message}; {reason}",
         measured={"gap": error.distance, "angle": error.angle, "mirror_image": mirror},
     )

@@ -10,9 +10,8 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.lint.rules.sym.mimic import same_way_follower
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules
 from terrainkit_robots.text import contrast, numbers
@@ -52,8 +51,7 @@ def limit_asymmetry(robot: Facts) -> Violations:
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
         yield Violation(
-            subject=odd.joint.name,
-            source=(odd.joint.limit or odd.joint).source,
+            element=Part(odd.joint.name, (odd.joint.limit or odd.joint).source),
             message=f"limits of joint {odd.joint.name}: got {numbers(own, '.5g', ' to ')} {unit}; "
             f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range; "
@@ -91,7 +89,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
         left, right = pair.left, pair.right
         differences: dict[str, tuple[float, float, float]] = {}
         for name in ("effort", "velocity"):
-            a, b = (_motor_limit(side.joint, name) for side in (left, right))
+            a, b = (getattr(side.joint, name) for side in (left, right))
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = relative_difference(a, b)
@@ -101,7 +99,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             continue
 
         def value(body: Body, name: str = next(iter(differences))) -> Matrix | None:
-            limit = _motor_limit(body.joint, name) if body.joint else None
+            limit = getattr(body.joint, name, None)
             return None if limit is None else np.array([limit])
 
         odd, other, reason = robot.outlier_first(pair, value)
@@ -110,19 +108,14 @@ def effort_asymmetry(robot: Facts) -> Violations:
         measured: dict[str, float | int | str] = {}
         for name, (a, b, difference) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
-            unit = joint.effort_unit if name == "effort" else joint.speed_unit
+            unit = getattr(joint.units, name)
             share, _ = contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")
             parts.append(f"{own:g} {unit}, {share} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield Violation(
-            subject=joint.name,
-            source=(joint.limit or joint).source,
+            element=Part(joint.name, (joint.limit or joint).source),
             message=f"{' and '.join(differences)} limit of joint {joint.name}: got "
             f"{' and '.join(parts)} of its mirror image {other.joint.name}; expected at "
             f"most {_MAX_LIMIT_DIFFERENCE:.0%}; {reason}",
             measured={**measured, "mirror_image": other.joint.name},
         )
-
-
-def _motor_limit(joint: Joint, name: str) -> float | None:
-    return joint.effort if name == "effort" else joint.velocity

@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.gaps import box_at_zero, shapes_of
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import mass_source
+from terrainkit_robots.analysis.inertia.inertial import mass_part
 from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     MAX_COM_ERROR,
     MAX_MASS_DIFFERENCE,
@@ -56,8 +56,7 @@ def mass_asymmetry(robot: Facts) -> Violations:
             continue
         odd, other, reason = robot.outlier_first(pair, lambda body: np.array([body.mass]))
         yield Violation(
-            subject=odd.body.name,
-            source=mass_source(odd.body.main_link),
+            element=mass_part(odd.body.main_link),
             message=f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
             f"{contrast(difference, MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
@@ -109,8 +108,7 @@ def com_asymmetry(robot: Facts) -> Violations:
         centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
         got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield Violation(
-            subject=odd.body.name,
-            source=mass_source(odd.body.main_link),
+            element=mass_part(odd.body.main_link),
             message=f"center of mass of body {odd.body.name}: got ({centers[0]}) mm, and "
             f"({centers[1]}) mm for its mirror image {other.body.name}, each in its own "
             f"frame: {got} mm from mirrored; expected at most {expected} mm; {reason}",
@@ -137,8 +135,7 @@ def _trunk_offset(robot: Facts) -> Violations:
     if trunk.mass > 0 and distance > limit and trunk.name not in reported:
         got, expected = contrast(1000 * distance, 1000 * limit, ".3g")
         yield Violation(
-            subject=trunk.name,
-            source=mass_source(trunk.main_link),
+            element=mass_part(trunk.main_link),
             message=f"distance of the center of mass of trunk {trunk.name} from the mirror plane: "
             f"got {got} mm; expected at most {expected} mm",
             measured={"gap": distance, "allowed": limit},

@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import side_words
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 _FINGER_NAME = re.compile(r"finger|grip|jaw|claw|knuckle|thumb")
 
@@ -71,8 +71,7 @@ def mimic_asymmetry(robot: Facts) -> Violations:
             mimic = odd.mimic
             assert mimic is not None
             yield Violation(
-                subject=odd.name,
-                source=mimic.source,
+                element=Part(odd.name, mimic.source),
                 message=f"mimic of joint {odd.name}: {problem}",
             )
 
@@ -84,8 +83,7 @@ def _same_way(robot: Facts) -> Violations:
         if follower is not None and (mimic := follower.mimic) is not None:
             links = f"{pair.left.body.top.name} and {pair.right.body.top.name}"
             yield Violation(
-                subject=follower.name,
-                source=mimic.source,
+                element=Part(follower.name, mimic.source),
                 certainty="likely",
                 message=f"mimic of joint {follower.name}: got the multiplier {mimic.multiplier:g}, "
                 f"which moves {links} the same way; expected opposite ways: the axis or the "

@@ -2,18 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import side_words
-from terrainkit_robots.lint.rule import Violation, Violations, get_rule, rule
-from terrainkit_robots.text import names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.description.model import Joint
+from terrainkit_robots.lint.rule import Part, Violation, Violations, get_rule, rule
+from terrainkit_robots.text import group, names
 
 MAX_SUGGESTIONS = 20
 """Maximum number of unknown names for which a similar name is suggested. Generated files may have
@@ -46,12 +42,13 @@ def unknown_link(robot: Facts) -> Violations:
         missing`.
     """
     links = robot.tree.links
-    missing: dict[str, list[tuple[str, Joint]]] = {}
-    for joint, reason in robot.tree.rejected:
-        for role, name in (("parent", joint.parent), ("child", joint.child)):
-            # XML013 reports a missing name.
-            if reason == "unknown-link" and name and name not in links:
-                missing.setdefault(name, []).append((role, joint))
+    missing = group(
+        (name, (role, joint))
+        for joint, reason in robot.tree.rejected
+        for role, name in (("parent", joint.parent), ("child", joint.child))
+        # XML013 reports a missing name.
+        if reason == "unknown-link" and name and name not in links
+    )
     for index, (name, uses) in enumerate(missing.items()):
         joints = names(f"{role} of joint {joint.name}" for role, joint in uses)
         yield Violation(
@@ -84,16 +81,13 @@ def multiple_parents(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/urdf/XML: a URDF describes a tree; MuJoCo: `URDF body has multiple parents`.
     """
-    extra: dict[str, list[Joint]] = {}
-    for joint, reason in robot.tree.rejected:
-        if reason == "second-parent":
-            extra.setdefault(joint.child, []).append(joint)
+    rejected = robot.tree.rejected
+    extra = group((joint.child, joint) for joint, why in rejected if why == "second-parent")
     first = {joint.child: joint for joint in reversed(robot.model.joints)}
     for child, joints in extra.items():
         listed = names(joint.name for joint in (first[child], *joints))
         yield Violation(
-            subject=child,
-            source=joints[0].source,
+            element=Part(child, joints[0].source),
             message=f"link {truncate(child)}: child of {len(joints) + 1} joints ({listed}); "
             "expected 1",
             measured={"joints": len(joints) + 1},
@@ -122,8 +116,7 @@ def cycle(robot: Facts) -> Violations:
             path = names([links[0], *links[:0:-1], links[0]], sep=" > ")
             size = f"{len(links)} links" if links[1:] else "1 link"
             yield Violation(
-                subject=links[0],
-                source=closing[links[0]].source,
+                element=Part(links[0], closing[links[0]].source),
                 message=f"cycle of {size}: {path}; expected a tree",
                 measured={"links": len(links)},
             )
@@ -147,8 +140,7 @@ def multiple_roots(robot: Facts) -> Violations:
     root, others = _roots(robot.tree)
     for name in others:
         yield Violation(
-            subject=name,
-            source=robot.tree.links[name].source,
+            element=robot.tree.links[name],
             message=f"link {truncate(name)}: has no parent joint, in addition to the root link "
             f"{truncate(root)}; expected 1 root",
         )
@@ -213,8 +205,6 @@ def no_links(robot: Facts) -> Violations:
         raise CannotCheckError("the file could not be read")
     what = "bodies" if model.kind == "mjcf" else "links"
     yield Violation(
-        subject=model.title,
-        source=model.source,
         message=f"number of {what}: got 0, with {len(model.joints)} joints; expected at least 1",
     )
 

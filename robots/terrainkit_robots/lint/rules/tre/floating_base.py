@@ -37,7 +37,7 @@ def no_free_joint(robot: Facts) -> Violations:
         for joint in model.joints
     ):
         return
-    edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
+    edit = InsertChild(source=root.source, xml="<freejoint/>")
     edits = [] if model.keyframe else [edit]
     yield Violation(
         element=root,

@@ -5,16 +5,13 @@ from collections.abc import Mapping, Sequence
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.text import names
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
+from terrainkit_robots.text import group, names
 
 
 def _duplicates(items: Sequence[Link] | Sequence[Joint]) -> Mapping[str, list[Link | Joint]]:
     """Return the items that share a name. XML013 reports missing names."""
-    by_name: dict[str, list[Link | Joint]] = {}
-    for item in items:
-        if item.name:
-            by_name.setdefault(item.name, []).append(item)
+    by_name = group((item.name, item) for item in items if item.name)
     return {name: same for name, same in by_name.items() if len(same) > 1}
 
 
@@ -39,8 +36,7 @@ def duplicate_name(robot: Facts) -> Violations:
         for name, same in _duplicates(items).items():
             lines = names(str(item.source.line) for item in same)
             yield Violation(
-                subject=name,
-                source=same[1].source,
+                element=Part(name, same[1].source),
                 message=f"name {truncate(name)}: used by {len(same)} {what}, on lines {lines}; "
                 "expected unique names",
                 measured={"count": len(same)},

@@ -8,7 +8,7 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.other_robot import (
     JointPair,
     joint_name,
@@ -61,8 +61,7 @@ def compare_joint_sets(robot: Facts) -> Violations:
                 if side is robot:
                     source = _fixed_source(robot, group[0]) or robot.model.source
                 yield Violation(
-                    subject=group[0].name,
-                    source=source,
+                    element=Part(group[0].name, source),
                     message=f"joints {text}: got {len(group)} "
                     f"({names(joint.name for joint in group)}); expected 0; moving joints: "
                     f"{counts['here']} here, {counts['there']} in {there}",
@@ -71,8 +70,7 @@ def compare_joint_sets(robot: Facts) -> Violations:
     renamed = joint_names.renamed
     if renamed:
         yield Violation(
-            subject=renamed[0][0],
-            source=next(j.source for j in robot.joints if j.name == renamed[0][0]),
+            element=next(joint for joint in robot.joints if joint.name == renamed[0][0]),
             severity="note",
             certainty="likely",
             message=f"{count(len(renamed), 'joint')} of {there} matched by a similar name: "

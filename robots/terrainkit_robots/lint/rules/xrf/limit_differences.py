@@ -1,6 +1,7 @@
 """Rules that compare position, velocity and effort limits."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.joints import (
     MAX_RELATIVE_DIFFERENCE,
     limit_tolerance,
@@ -20,7 +21,7 @@ from terrainkit_robots.lint.rules.xrf.other_robot import (
     other_name,
     other_robot,
 )
-from terrainkit_robots.text import names
+from terrainkit_robots.text import group, names
 
 _Difference = TypeVar("_Difference")
 
@@ -40,19 +41,18 @@ def compare_limits(robot: Facts) -> Violations:
     """
     there = other_name(robot)
     pairs = matching_joints(robot)
-    for _, group in _grouped(pairs, _range_difference):
-        one, other = group[0]
+    for _, same in _grouped(pairs, _range_difference):
+        one, other = same[0]
         yield _report_group(
-            group,
+            same,
             "limits",
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
             f"difference of at most {limit_tolerance(one)} {one.unit}",
         )
-    velocities = {one.name: (one.velocity, other.velocity) for one, other in pairs}
-    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
-        unit = group[0][0].speed_unit
+    for (_, a, b), same in _grouped(pairs, partial(_difference, "velocity")):
+        unit = same[0][0].units.velocity
         yield _report_group(
-            group,
+            same,
             "velocity limit",
             f"{a:.6g} {unit} here and {b:.6g} {unit} in {there}; expected a difference of at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
@@ -67,11 +67,12 @@ def _range_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
     return one.kind == "prismatic", a, b
 
 
-def _difference(joint: Joint, a: float | None, b: float | None) -> tuple[bool, float, float] | None:
+def _difference(name: str, one: Joint, other: Joint) -> tuple[bool, float, float] | None:
     """Return whether a joint slides, and its two limits if both are given and they differ."""
+    a, b = getattr(one, name), getattr(other, name)
     if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
         return None
-    return joint.kind == "prismatic", a, b
+    return one.kind == "prismatic", a, b
 
 
 def _format_range(joint: Joint) -> str:
@@ -84,27 +85,22 @@ def _grouped(
     pairs: Sequence[JointPair], key: Callable[[Joint, Joint], _Difference | None]
 ) -> Iterable[tuple[_Difference, list[JointPair]]]:
     """Return each difference with the pairs that have it, without the pairs that agree."""
-    groups: dict[_Difference, list[JointPair]] = {}
-    for one, other in pairs:
-        difference = key(one, other)
-        if difference is not None:
-            groups.setdefault(difference, []).append((one, other))
-    return groups.items()
+    differences = ((key(*pair), pair) for pair in pairs)
+    return group((found, pair) for found, pair in differences if found is not None).items()
 
 
 def _report_group(
-    group: Sequence[JointPair], label: str, difference: str, severity: Severity | None = None
+    same: Sequence[JointPair], label: str, difference: str, severity: Severity | None = None
 ) -> Violation:
-    one, other = group[0]
-    listed = names(joint_name(a, b) for a, b in group)
-    joints = f"{len(group)} joints ({listed})" if len(group) > 1 else f"joint {listed}"
+    one, other = same[0]
+    listed = names(joint_name(a, b) for a, b in same)
+    joints = f"{len(same)} joints ({listed})" if len(same) > 1 else f"joint {listed}"
     return Violation(
-        subject=one.name,
-        source=(one.limit or one).source,
+        element=Part(one.name, (one.limit or one).source),
         severity=severity,
         message=f"{label} of {joints}: got {difference} "
         f"(line {(other.limit or other).source.line} there)",
-        measured={"joints": len(group)},
+        measured={"joints": len(same)},
     )
 
 
@@ -123,28 +119,26 @@ def compare_effort(robot: Facts) -> Violations:
     """
     other, there = other_robot(robot), other_name(robot)
     pairs = matching_joints(robot)
-    efforts = {a.name: (a.effort, b.effort) for a, b in pairs}
 
-    def missing(one: Joint, _: Joint) -> bool | None:
-        a, b = map(bool, efforts[one.name])
-        return None if a == b else a
+    def missing(one: Joint, other: Joint) -> bool | None:
+        return None if bool(one.effort) == bool(other.effort) else bool(one.effort)
 
-    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
-        unit = group[0][0].effort_unit
+    for (_, a, b), same in _grouped(pairs, partial(_difference, "effort")):
+        unit = same[0][0].units.effort
         yield _report_group(
-            group,
+            same,
             "effort limit",
             f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
             f"{relative_difference(a, b):.1%} apart; expected at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
         )
-    for limited, group in _grouped(pairs, missing):
+    for limited, same in _grouped(pairs, missing):
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
         without = there if limited else "this file"
         note = ", which has no actuators"
         yield _report_group(
-            group,
+            same,
             "effort limit",
             f"none in {without}{'' if has_actuators else note}; expected the limit of "
             f"{'this file' if limited else there}",

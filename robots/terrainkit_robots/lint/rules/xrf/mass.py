@@ -5,14 +5,14 @@ import math
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import mass_source
+from terrainkit_robots.analysis.inertia.inertial import mass_part
 from terrainkit_robots.analysis.simulator_conventions.loaded_robot import dropped_mass
 from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
     has_valid_inertial,
     relative_difference,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.other_robot import other_name, other_robot, robot_pairs
 from terrainkit_robots.text import names, numbers
 
@@ -81,8 +81,7 @@ def _missing_mass(robot: Facts, other: Facts) -> Violations:
             root = urdf.bodies[0].top.name
             file = truncate(urdf.model.file.name)
             yield Violation(
-                subject=root,
-                source=robot.model.source,
+                element=Part(root, robot.model.source),
                 severity="note",
                 message=f"mass that MuJoCo drops when it loads {file}: got {dropped:.5g} of "
                 f"{urdf.total_mass:.5g} kg; expected 0 kg, as for {truncate(mjcf.model.file.name)} "
@@ -138,8 +137,7 @@ def compare_inertia(robot: Facts) -> Violations:
             )
         if message:
             yield Violation(
-                subject=one.name,
-                source=mass_source(one.main_link),
+                element=mass_part(one.main_link),
                 message=message,
                 measured={"mass": gap.mass, "center": gap.center, "inertia": gap.inertia},
             )

@@ -6,7 +6,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.other_robot import (
     joint_pairs,
     other_name,
@@ -109,5 +109,6 @@ def _actuator_difference(robot: Facts) -> str:
 
 
 def _report_actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
-    first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
-    return Violation(source=first, message=message, severity=severity)
+    source = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
+    part = Part(robot.model.title, source)
+    return Violation(element=part, message=message, severity=severity)

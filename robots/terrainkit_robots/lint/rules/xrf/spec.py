@@ -1,6 +1,6 @@
 """Rules that compare the robot with its robot.toml."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from terrainkit.settings.text import closest, truncate
@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.text import names
 
@@ -26,9 +26,9 @@ def _report(
     robot: Facts, name: str, message: str, measured: Mapping[str, float] = MappingProxyType({})
 ) -> Violation:
     """Return a violation at the joint or link of that name, or at the robot."""
-    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name)
-    subject = truncate(name) or robot.model.title
-    return Violation(element=element, subject=subject, message=message, measured=measured)
+    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name) or robot.model
+    part = Part(truncate(name) or robot.model.title, element.source)
+    return Violation(element=part, message=message, measured=measured)
 
 
 def _suggest(name: str, candidates: Sequence[str]) -> str:
@@ -265,26 +265,18 @@ def spec_motor_limits(robot: Facts) -> Violations:
     Source:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _check_limits(robot, "effort", lambda j: j.effort, lambda j: j.effort_unit)
-    yield from _check_limits(robot, "velocity", lambda j: j.velocity, lambda j: j.speed_unit)
-
-
-def _check_limits(
-    robot: Facts,
-    table: str,
-    limit_of: Callable[[Joint], float | None],
-    unit_of: Callable[[Joint], str],
-) -> Violations:
     joints = {joint.name: joint for joint in robot.actuated}
-    values = match_joints(getattr(robot.required_spec, table), _table_joints(robot)).values
-    for name, value in values.items():
-        limit, unit = limit_of(joints[name]), unit_of(joints[name])
-        if limit is not None and limit > 0 and value > _MAX_LIMIT_RATIO * limit:
-            message = (
-                f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} times "
-                f"the limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
-            )
-            yield _report(robot, name, message, {table: value, "declared": limit})
+    for table in ("effort", "velocity"):
+        values = match_joints(getattr(robot.required_spec, table), _table_joints(robot)).values
+        for name, value in values.items():
+            limit, unit = (getattr(of, table) for of in (joints[name], joints[name].units))
+            if limit is not None and 0 < _MAX_LIMIT_RATIO * limit < value:
+                message = (
+                    f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} "
+                    f"times the limit of {robot.model.file.name}; expected at most {limit:.4g} "
+                    f"{unit}"
+                )
+                yield _report(robot, name, message, {table: value, "declared": limit})
 
 
 @rule("XRF017", "spec-mirror", "error", needs=("spec",))
