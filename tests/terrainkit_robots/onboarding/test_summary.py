@@ -32,7 +32,7 @@ def lines(monkeypatch, stood):
             "report": SimpleNamespace(findings=findings),
             "fixed": (),
             "robot": SimpleNamespace(
-                files=dict(files), facts=SimpleNamespace(legs=legs), changes=changes
+                files=dict(files), facts=SimpleNamespace(legs=legs, loops=()), changes=changes
             ),
             "verification": checks,
             "configs": {},
