@@ -64,7 +64,8 @@ class Onboard(Command):
     says so, or if the robot has legs or wheels."""
 
     spec: InputPath | None = None
-    """A robot.toml, such as an edited one, whose values override the derived values."""
+    """A robot.toml, such as an edited one, whose values override the derived values; or a file with
+    nothing but the closed loops of a URDF and its motors (loops, joint_order)."""
 
     gains: Literal["stand", "train"] = "stand"
     """PD gains: stand uses the gains of position controllers in the file, or suggested ones that

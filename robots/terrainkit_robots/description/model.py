@@ -382,7 +382,7 @@ class Joint:
     mimic: Mimic | None = None
 
     coupled: bool = False
-    """Whether other joints move it through a closed loop or a tendon; MJCF only."""
+    """Whether other joints move it through a closed loop or a tendon."""
 
     dynamics: Dynamics | None = None
     """Damping and friction; None if the file declares neither."""
@@ -528,7 +528,7 @@ class RobotModel:
     """Joints in document order, including duplicates."""
 
     actuators: tuple[Actuator, ...] = ()
-    """Actuators in document order; MJCF only."""
+    """Actuators in document order; in URDF, of the joints that a spec with loops names."""
 
     driven: frozenset[str] = frozenset()
     """Names of joints with a transmission or a command interface of ros2_control; URDF only."""

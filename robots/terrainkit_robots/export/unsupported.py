@@ -1,4 +1,4 @@
-"""List the elements of an MJCF that are not exported."""
+"""List the elements of a robot file that are not exported."""
 
 from collections import Counter
 
@@ -11,11 +11,9 @@ _SECTIONS = ("deformable", "extension", "custom")
 
 
 def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
-    """Return one line for each kind of MJCF element that is not exported."""
-    if model.kind != "mjcf":
-        return ()
+    """Return one line for each kind of element that is not exported, or not to robot.urdf."""
     ignored = Counter[str]()
-    for file in model.sources:
+    for file in model.sources if model.kind == "mjcf" else ():
         root = parse_xml(file, read_bytes(file)).root
         if root is None:
             continue

@@ -12,6 +12,7 @@ from terrainkit_robots.lint.runner import Report, Skipped, has_inputs, lint
 from terrainkit_robots.lint.settings import Settings, matching, read_settings
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.spec.loops import LoopSpec, load_spec, with_loop_spec
 from terrainkit_robots.text import display_path, group, names
 
 
@@ -128,7 +129,7 @@ def check_robot(
     settings: Settings | None = None,
     *,
     against: str | Path | None = None,
-    spec: str | Path | None = None,
+    spec: str | Path | LoopSpec | None = None,
     contents: Mapping[Path, bytes] | None = None,
 ) -> Report:
     """Return what the lint rules find in a robot file.
@@ -139,7 +140,7 @@ def check_robot(
             the nearest terrainkit.toml or pyproject.toml in the folder of the file or above it;
             for a name, in the working directory or above it.
         against: Another file of the same robot, to compare with.
-        spec: The robot.toml of the robot, to compare with.
+        spec: The robot.toml of the robot, to compare with; or only the loops of one.
         contents: Bytes to read instead of the files at these paths, such as the result of a fix.
 
     Returns:
@@ -148,10 +149,8 @@ def check_robot(
     Raises:
         RobotFileError: if a file cannot be found, downloaded or opened.
         ConfigError: if the settings name an unknown rule or links that end no legs, `against` is
-            not a robot, or the spec is invalid.
+            not a robot, or the spec is invalid or its loops do not fit the robot.
     """
-    from terrainkit_robots.spec.robot_spec import RobotSpec
-
     path, contents = Path(path), contents or {}
     if settings is None:
         settings = read_settings(path.parent)
@@ -163,9 +162,11 @@ def check_robot(
             reason = f": {model.problems[0].message}" if model.problems else ""
             raise ConfigError(f"{against} does not describe a robot{reason}")
         other = Facts(model)
-    robot_spec = RobotSpec.load(Path(spec)) if spec is not None else None
+    robot_spec, loop_spec = None, spec if isinstance(spec, LoopSpec) else LoopSpec()
+    if isinstance(spec, str | Path):
+        robot_spec, loop_spec = load_spec(spec)
     model = load_robot(path, packages=packages, xacro_arguments=arguments, contents=contents)
-    model = replace(model, feet=settings.feet)
+    model = with_loop_spec(replace(model, feet=settings.feet), loop_spec)
     facts = Facts(model, Meshes(contents), against=other, spec=robot_spec)
     feet = {leg.foot for leg in facts.legs}
     if wrong := [foot for foot in settings.feet if foot not in feet]:

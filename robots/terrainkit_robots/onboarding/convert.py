@@ -103,8 +103,10 @@ def convert(
         spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec), str(options.spec))
     # Gains and limits are derived from the robot that is written, with its meshes.
     spec = _derived_spec(Facts(model, meshes), options.gains)
+    if set(source.actuator_order) == set(spec.joint_order) and source.model.kind != "mjcf":
+        spec = replace(spec, joint_order=source.actuator_order)  # of a spec with only loops
     if user_spec is not None:
-        own = replace(user_spec, floating=spec.floating, urdf=URDF, mjcf=MJCF)
+        own = replace(user_spec, floating=spec.floating, urdf=URDF, mjcf=MJCF, loops=spec.loops)
         spec = with_provenance(own, spec, str(options.spec))
     if name:
         model, spec = replace(model, name=name), replace(spec, name=name)

@@ -33,7 +33,7 @@ class OnboardOptions:
     """Whether the base is floating; None to decide from the file and the legs."""
 
     spec: Path | None = None
-    """A robot.toml whose values override the derived values."""
+    """A robot.toml whose values override the derived values, or a file with only its loops."""
 
     gains: "GainSet" = "stand"
     """PD gains to suggest: `stand` holds the default pose without a policy; `train` is as soft as

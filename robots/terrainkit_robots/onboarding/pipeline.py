@@ -15,6 +15,7 @@ from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import check_and_repair
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown
+from terrainkit_robots.spec.loops import LoopSpec, load_spec
 
 
 def onboard(
@@ -39,8 +40,6 @@ def onboard(
         TerrainkitError: if a file cannot be read or written, an option is invalid, or MuJoCo
             rejects the robot.
     """
-    from terrainkit_robots.spec.robot_spec import RobotSpec
-
     path, options = Path(path), options or OnboardOptions()
     for framework in options.frameworks:
         check_framework(framework)
@@ -50,12 +49,14 @@ def onboard(
         )
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
-    user_spec = None if options.spec is None else RobotSpec.load(options.spec)
+    user_spec, loop_spec = load_spec(options.spec) if options.spec else (None, LoopSpec())
+    if user_spec is None:
+        options = replace(options, spec=None)  # it has only loops, and all values are derived
     options.on_step(f"checking {path.name}")
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = options.settings.over(read_settings(path.parent))
     settings = replace(settings, select=(), simulate=False)
-    report, fixed = check_and_repair(path, settings, unsafe=options.unsafe_fixes)
+    report, fixed = check_and_repair(path, settings, loop_spec, unsafe=options.unsafe_fixes)
     result = OnboardResult(report=report, fixed=fixed)
     for rule in result.report.crashed:
         raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")

@@ -9,6 +9,7 @@ from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.lint.settings import Settings
+from terrainkit_robots.spec.loops import LoopSpec
 from terrainkit_robots.text import names
 
 _MAX_CHANGE = 0.01
@@ -17,13 +18,14 @@ are less accurate than this."""
 
 
 def check_and_repair(
-    path: Path, settings: Settings, *, unsafe: bool
+    path: Path, settings: Settings, loop_spec: LoopSpec, *, unsafe: bool
 ) -> tuple[Report, tuple[Finding, ...]]:
     """Check a robot, with the safe fixes of the rules and the repairs of onboarding.
 
     Args:
         path: A robot file, or the name of a robot.
         settings: How the file is read and checked.
+        loop_spec: Loops and motors that a spec adds.
         unsafe: Whether to apply fixes that change a number, a shape or a mesh.
 
     Returns:
@@ -32,7 +34,7 @@ def check_and_repair(
     from terrainkit_robots.lint.fixes.apply import fix_robot
 
     def check(contents: Mapping[Path, bytes]) -> Report:
-        report = check_robot(path, settings, contents=contents)
+        report = check_robot(path, settings, spec=loop_spec, contents=contents)
         findings = tuple(_with_safe_fix(report, finding) for finding in report.findings)
         return replace(report, findings=findings)
 

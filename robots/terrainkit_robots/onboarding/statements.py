@@ -12,6 +12,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.permutation import permutation
+from terrainkit_robots.analysis.legs.closed_loops import largest_gap
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
@@ -19,6 +20,7 @@ from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_
 from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
 from terrainkit_robots.lint.rule import SEVERITIES, Finding
 from terrainkit_robots.onboarding.comparison import NUM_STATES, error_text
+from terrainkit_robots.onboarding.frameworks.frameworks import reads_mjcf
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import StandResult
+
+_MAX_GAP = 0.001
+"""Distance of the two ends of a loop above which it is open [m]."""
 
 _HEADINGS = {
     "pictures": "",
@@ -89,6 +94,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
         return
     yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
     yield from _comparison(checks)
+    yield from _loops(result, robot)
     if checks.standing is not None and (text := result.unjudged):
         yield Statement("standing", [f"Its standing is {text}.\n"], "standing", text)
     else:
@@ -97,12 +103,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
     yield Statement("joints", _joints(robot))
     yield Statement("orders", _simulators(robot))
     yield Statement("next", _commands(result, robot))
-    if result.configs:
-        rows = [(files[0], "see its docstring") for files in result.configs.values()]
-        listed = names(file for files in result.configs.values() for file in files)
-        yield Statement("next", titled_list("Framework configurations", rows), "configs", listed)
-    for framework, reason in result.skipped_configs.items():
-        yield Statement("next", (), "skipped", f"{framework}: {reason}")
+    yield from _configs(result)
     pictures = f"{count(len(result.images), 'picture')} in report.md"
     if not result.images:
         pictures = f"none: {result.images_error}"
@@ -302,6 +303,24 @@ def _comparison(checks: "Verification") -> Iterator[Statement]:
         yield Statement("comparison", [f"- {cell(text)}\n"], "compared", text)
 
 
+def _loops(result: "OnboardResult", robot: "RobotFiles") -> Iterator[Statement]:
+    """Yield whether the closed loops are closed, which joints move them, and who lacks them."""
+    facts = robot.facts
+    if not facts.loops:
+        return
+    gap = largest_gap(facts.loops, facts.bodies, facts.default_pose)
+    loops = count(len(facts.model.loops), "loop")
+    text = f"{loops} closed within {1000 * gap:.2g} mm at the default pose"
+    if gap > _MAX_GAP:
+        text = f"NO: {loops} open by up to {1000 * gap:.3g} mm at the default pose"
+    moved = {joint.name for joint in facts.joints if joint.coupled and joint.mimic is None}
+    if moved <= set(robot.spec.joint_order):
+        text += "; all their joints have motors, unless joint_order of --spec names those that have"
+    if without := [name for name in result.configs if not reads_mjcf(name)]:
+        text += f"; robot.urdf, which {names(without)} reads, has none, and its rods hang loose"
+    yield Statement("comparison", [f"Loops: {cell(text)}.\n"], "loops", text)
+
+
 def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:
     text, lines = _standing_text(checks, robot), []
     if robot.facts.legs:
@@ -388,6 +407,16 @@ def _pictures(result: "OnboardResult") -> Iterator[str]:
         yield f"| {' | '.join(images)} |\n"
     elif result.images_error:
         yield f"No pictures: {cell(result.images_error)}.\n"
+
+
+def _configs(result: "OnboardResult") -> Iterator[Statement]:
+    """Yield the configurations of frameworks, and those that were skipped."""
+    if result.configs:
+        rows = [(files[0], "see its docstring") for files in result.configs.values()]
+        listed = names(file for files in result.configs.values() for file in files)
+        yield Statement("next", titled_list("Framework configurations", rows), "configs", listed)
+    for framework, reason in result.skipped_configs.items():
+        yield Statement("next", (), "skipped", f"{framework}: {reason}")
 
 
 def _commands(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:

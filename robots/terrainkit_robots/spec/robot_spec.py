@@ -82,6 +82,26 @@ class MirrorJoint(Config):
     """+1 or -1."""
 
 
+Point = tuple[Height, Height, Height]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoop(Config):
+    """A loop that a URDF cannot have: two links share a point."""
+
+    links: Annotated[tuple[Name, Name], UNIQUE]
+    """The two links."""
+
+    anchor: Point
+    """The point in the frame of the first link [m]."""
+
+    other_anchor: Point | None = None
+    """The point in the frame of the second link [m]; none: where it is with all joints at zero."""
+
+    kind: Literal["connect", "weld"] = "connect"
+    """Whether the links may turn about the point, or keep their orientation at zero as well."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec(Config):
     """The parameters of a robot that training needs besides its description. SI units and radians.
@@ -124,6 +144,9 @@ class RobotSpec(Config):
 
     penalized_contacts: Names = ()
     """Bodies whose contacts are penalized."""
+
+    loops: tuple[ClosedLoop, ...] = ()
+    """Closed loops of the robot, which the URDF cannot have; the MJCF has them."""
 
     default_pose: Mapping[Name, Position]
     """Position of each joint that its action is added to."""
@@ -232,6 +255,11 @@ class RobotSpec(Config):
             if isinstance(value, Mapping):
                 header = f"{about}[{name}]{comment_text(*comments)}"
                 tables.append("\n".join([header, *self._table_lines(name, value), ""]))
+            elif name == "loops":
+                for loop in self.loops:
+                    lines = (line_text(k, v) for k, v in loop.to_table().items() if v is not None)
+                    tables.append("\n".join([f"{about}[[loops]]", *lines, ""]))
+                    about = ""
             elif value is not None:
                 values.append(f"{about}{line_text(name, value, *comments)}\n")
         head = _HEAD.format(name=comment_text(self.name)[4:] or "The robot")

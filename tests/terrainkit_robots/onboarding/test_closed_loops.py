@@ -1,11 +1,14 @@
 """A quadruped whose legs are five-bar linkages keeps its loops, stands and can be trained."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
 
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.onboarding.statements import summarize
 from terrainkit_robots.rl.env import make_env
 from terrainkit_robots.rl.tasks import default_task
 from terrainkit_robots.rl.terrain import Plane
@@ -71,6 +74,25 @@ def test_five_bar_legs_stand_with_their_loops(result):
     assert (checks.differences, checks.failures) == ((), ())
     assert len(checks.responses) == 8
     assert all(response.failure == "" for response in checks.responses)
+
+
+def test_loops_of_a_spec_close_a_urdf(result, tmp_path):
+    # robot.urdf lost the loops, which robot.toml has.
+    text = (result.folder / "robot.toml").read_text()
+    loops = re.findall(r"\[\[loops\]\].*?\n\n", text, re.DOTALL)
+    motors = f"joint_order = {list(result.robot.spec.joint_order)}\n"
+    (tmp_path / "loops.toml").write_text(motors + "".join(loops))
+    for spec in (result.folder / "robot.toml", tmp_path / "loops.toml"):
+        options = OnboardOptions(
+            render_images=False, spec=spec, frameworks=("genesis", "mjlab"), overwrite=True
+        )
+        again = onboard(result.folder / "robot.urdf", tmp_path / "out", options)
+        said = dict(summarize(again))
+        assert said["loops"].startswith("4 loops closed within 0.")
+        assert "robot.urdf, which genesis reads, has none" in said["loops"]
+        assert said["standing"].startswith("yes: 5 s with the gains of robot.toml")
+        assert again.robot.spec.joint_order == result.robot.spec.joint_order
+        assert again.robot.spec.loops == result.robot.spec.loops
 
 
 def test_training_starts_with_closed_loops(result):

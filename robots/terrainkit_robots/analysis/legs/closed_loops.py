@@ -18,6 +18,9 @@ _MAX_STEP = 0.2
 
 _ITERATIONS = 100
 
+_MAX_JOINTS = 300
+"""Loops with more joints are not closed: the memory grows with the square of their number."""
+
 _DIFFERENCE = 1e-6
 """Step of the finite differences [rad] or [m]."""
 
@@ -90,6 +93,14 @@ def close_loops(
     return dict(positions)
 
 
+def largest_gap(
+    loops: Sequence[BodyLoop], bodies: Sequence[Body], positions: Mapping[str, float]
+) -> float:
+    """Return the largest distance between the two points of a loop [m]; see `close_loops`."""
+    gaps = _gaps(loops, body_poses(bodies, positions)).reshape(-1, 3)
+    return float(np.linalg.norm(gaps, axis=1).max())
+
+
 def _solve(
     loops: Sequence[BodyLoop],
     bodies: Sequence[Body],
@@ -97,7 +108,7 @@ def _solve(
     joints: Sequence[Joint],
 ) -> dict[str, float]:
     """Return the positions of some joints that close the loops, by Gauss-Newton; or none."""
-    if not joints:
+    if not 0 < len(joints) <= _MAX_JOINTS:
         return {}
     q = np.array([positions[joint.name] for joint in joints])
     ranges = [joint.range or (-np.inf, np.inf) for joint in joints]

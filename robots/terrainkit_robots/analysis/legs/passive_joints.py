@@ -1,7 +1,7 @@
 """Find passive joints: joints that no motor moves, by design."""
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.description.model import Joint, RobotModel
@@ -24,7 +24,8 @@ def passive_joints(
 
     A joint that mimics another one is passive. In MJCF, so is a joint without an actuator that
     moves with a closed loop or hangs on a leg; in URDF, a joint without an effort that hangs on a
-    leg, is named so, or has no transmission although others have.
+    leg, is named so, or has no transmission although others have, and a joint of a closed loop that
+    is not among the joints with an actuator, a transmission or an effort, whichever the file has.
 
     Args:
         model: The robot.
@@ -43,14 +44,25 @@ def passive_joints(
         motors = {joint.name for joint in free if joint.effort != 0}
     if len(motors) < _MIN_MOTOR_SHARE * len(free):
         motors = {joint.name for joint in free}
+    known = _known_motors(model, free)
+    if known and model.kind != "mjcf":
+        coupled = {joint.name for joint in free if joint.coupled}
+        motors = (motors - coupled) | (known & coupled)
     found = {joint.name: f"it follows {j.joint}" for _, joint in moved if (j := joint.mimic)}
     for body, joint in moved:
         if joint.name not in motors and joint.name not in found:
             hangs = body.parent in leg_bodies and body.index not in leg_bodies
-            reason = OPEN_LINKAGE if hangs else _other_reason(joint, driven, model.kind == "mjcf")
+            is_open = hangs and not joint.coupled
+            reason = OPEN_LINKAGE if is_open else _other_reason(joint, driven, model.kind == "mjcf")
             if reason:
                 found[joint.name] = reason
     return found
+
+
+def _known_motors(model: RobotModel, joints: Sequence[Joint]) -> Set[str]:
+    """Return the joints that have a motor for sure; none if the file does not say."""
+    actuated = {actuator.joint for actuator in model.actuators}
+    return actuated or model.driven or {joint.name for joint in joints if joint.effort}
 
 
 def _other_reason(joint: Joint, driven: Collection[str], is_mjcf: bool) -> str:

@@ -22,6 +22,7 @@ from terrainkit_robots.description.fix import (
     make_fix,
     number_fix,
 )
+from terrainkit_robots.description.loops import with_loops
 from terrainkit_robots.description.model import (
     Dynamics,
     Geometry,
@@ -44,6 +45,7 @@ from terrainkit_robots.description.urdf.colors import (
     named_colors,
     undefined_materials,
 )
+from terrainkit_robots.description.urdf.gazebo_joints import gazebo_loops
 from terrainkit_robots.description.urdf.references import invalid_references
 from terrainkit_robots.description.urdf.srdf import invalid_srdf
 from terrainkit_robots.description.urdf.tags import (
@@ -99,7 +101,7 @@ class _Reader:
         links = tuple(self._link(element) for element in root.iterchildren("link"))
         joints = tuple(self._joint(element) for element in root.iterchildren("joint"))
         compiler = root.find("mujoco/compiler")
-        return RobotModel(
+        model = RobotModel(
             name=root.get("name", "").strip(),
             kind="urdf",
             file=self._doc.file,
@@ -108,9 +110,15 @@ class _Reader:
             joints=joints,
             driven=frozenset(_driven_joints(root)),
             keeps_fixed_links=compiler is not None and compiler.get("fusestatic") == "false",
-            problems=tuple(self._problems),
             sources=(self._doc.file,),
         )
+        loops = []
+        for element, found in gazebo_loops(root, model):
+            if isinstance(found, str):
+                self._report("XML019", element, f"<joint> in <gazebo> is not read: {found}")
+            else:
+                loops.append(found)
+        return replace(with_loops(model, loops), problems=tuple(self._problems))
 
     def _report(
         self,

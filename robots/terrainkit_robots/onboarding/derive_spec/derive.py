@@ -20,6 +20,7 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
 )
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded, rounded_length
+from terrainkit_robots.spec.loops import closed_loops
 from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
@@ -92,6 +93,7 @@ def derive_spec(
         thighs=named_bodies.thighs(facts),
         termination_contacts=named_bodies.termination_contacts(facts),
         penalized_contacts=named_bodies.penalized_contacts(facts),
+        loops=closed_loops(facts.model),
         **values,
         soft_limits=by_pattern(_soft_limits(facts, pose), [j.name for j in facts.actuated]),
         reset_range=reset,

@@ -2,6 +2,7 @@
 
 Each framework is a module of this package with a flag `LEGGED_ONLY` and a function `config_text`,
 or `config_files` if there are several files. `train_commands` returns how to train the robot.
+Without a flag `READS_MJCF`, a framework reads robot.urdf, which has no closed loops.
 """
 
 import importlib
@@ -46,6 +47,11 @@ def check_framework(name: str) -> None:
     if name not in framework_names():
         expected = expected_names(name, framework_names(), "expected")
         raise ConfigError(f"framework: got {name!r}; {expected}")
+
+
+def reads_mjcf(name: str) -> bool:
+    """Return whether a framework reads robot.xml instead of robot.urdf."""
+    return getattr(_get_module(name), "READS_MJCF", False)
 
 
 def config_files(name: str, robot: ConfigRobot) -> dict[str, str]:

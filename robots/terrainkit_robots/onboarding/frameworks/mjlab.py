@@ -18,6 +18,9 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 LEGGED_ONLY = False
 """Whether the framework supports only robots with legs."""
 
+READS_MJCF = True
+"""Whether the framework reads robot.xml, which has the closed loops, instead of robot.urdf."""
+
 _FIELDS = {
     "stiffness": "stiffness",
     "damping": "damping",

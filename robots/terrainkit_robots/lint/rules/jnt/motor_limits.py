@@ -36,8 +36,8 @@ _MIN_LEG_VELOCITY = 0.2
 
 
 _HOW_TO_CLOSE = (
-    "Close the loop in MJCF or in the simulator, or remove the part, which hangs loose. It needs "
-    "no effort, and no action."
+    "Close the loop with [[loops]] in the file of --spec, or remove the part, which hangs loose. "
+    "It needs no effort, and no action."
 )
 
 

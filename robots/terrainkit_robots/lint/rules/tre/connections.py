@@ -75,8 +75,8 @@ def multiple_parents(robot: Facts) -> Violations:
     drop one of the joints.
 
     Fix:
-        Remove all but one of these joints. Close a loop in MJCF with <equality><connect>, in SDF,
-        or in the simulator.
+        Remove all but one of these joints, and close the loop with a <gazebo><joint>, or with
+        [[loops]] in the file of --spec.
 
     Source:
         wiki.ros.org/urdf/XML: a URDF describes a tree; MuJoCo: `URDF body has multiple parents`.

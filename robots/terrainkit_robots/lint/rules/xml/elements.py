@@ -42,15 +42,16 @@ def unread_element(robot: Facts) -> None:
 
     URDF readers silently skip a <ros2_control> or a <transmission> inside of <gazebo>, and a link
     inside of another one. They skip <pose> of SDF as well, so that a joint without an <origin>
-    lies in the frame of its parent.
+    lies in the frame of its parent. A joint of SDF inside of <gazebo> closes a loop; it is reported
+    if it cannot.
 
     Fix:
         Make the element a child of <robot>, or write what the message names.
 
     Source:
         Issue 1602 of ros2_control and issue 2 of botanbot_sim; wiki.ros.org/urdf/XML. The contents
-        of plugins, sensors and other extensions, and links and joints of SDF inside of <gazebo>,
-        are not checked.
+        of plugins, sensors and other extensions, and links of SDF inside of <gazebo>, are not
+        checked.
     """
 
 
