@@ -63,6 +63,9 @@ legs. {summary}
 The repositories were read without their files of 4 MiB and more, so that large visual meshes are
 missing (MSH001).
 
+The rows are of 2026-11-27, except the six that are rejected for INR005 and INR006 alone. They are
+of 2026-11-29, since when these errors prevent onboarding.
+
 To reproduce the tables:
 
 ```sh

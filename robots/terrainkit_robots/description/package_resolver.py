@@ -297,8 +297,11 @@ def _names_on_disk(path: Path, count: int) -> list[str]:
             break
         if at.name not in ("", ".", ".."):
             entries = _list_names(at.parent)
-            matches = [entry for entry in entries if entry.lower() == at.name.lower()]
-            names.append(matches[0] if len(matches) == 1 and at.name not in entries else at.name)
+            name = at.name
+            if name not in entries:
+                matches = [entry for entry in entries if entry.lower() == name.lower()]
+                name = matches[0] if len(matches) == 1 else name
+            names.append(name)
     return names[::-1]
 
 

@@ -18,8 +18,7 @@ def convex_hull(points: Points, max_vertices: int | None = None) -> Surface:
 
     Args:
         points: Finite points without duplicates, shape (n, 3).
-        max_vertices: Maximum number of vertices; a larger hull is reduced to extreme points in that
-            many directions.
+        max_vertices: Maximum number of vertices; see `reduce_hull`.
 
     Raises:
         MeshError: If the points lie in a plane.
@@ -30,10 +29,14 @@ def convex_hull(points: Points, max_vertices: int | None = None) -> Surface:
         )
     if len(points) > _MAX_POINTS:
         points = _extreme_points_per_cell(points)
-    hull = _mujoco_hull(points)
-    if max_vertices is not None and len(hull.points) > max_vertices:
-        hull = _mujoco_hull(hull.points[_extreme_points_per_direction(hull.points, max_vertices)])
-    return hull
+    return reduce_hull(_mujoco_hull(points), max_vertices)
+
+
+def reduce_hull(hull: Surface, max_vertices: int | None) -> Surface:
+    """Return a hull with at most that many vertices: extreme points in that many directions."""
+    if max_vertices is None or len(hull.points) <= max_vertices:
+        return hull
+    return _mujoco_hull(hull.points[_extreme_points_per_direction(hull.points, max_vertices)])
 
 
 def _mujoco_hull(points: Points) -> Surface:

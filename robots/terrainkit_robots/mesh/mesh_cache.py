@@ -22,6 +22,7 @@ from terrainkit_robots.mesh.sniff import (
 )
 from terrainkit_robots.mesh.surface import (
     STL_RECORD,
+    Faces,
     MeshError,
     Points,
     Surface,
@@ -122,12 +123,24 @@ class Meshes:
             mesh: The file with its scale.
 
         Returns:
-            Vertices [m], which may repeat, shape (n, 3).
+            Vertices [m], which may repeat, except those of STL, shape (n, 3).
 
         Raises:
             MeshError: If the file cannot be read, or a coordinate is too large.
         """
         return self._cached(("vertices", mesh.path, mesh.scale), lambda: self._scaled(mesh))
+
+    def listed_vertices(self, path: Path) -> Faces:
+        """Return the index of each vertex as often as the file lists it: in STL for each face.
+
+        Raises:
+            MeshError: If the file cannot be read.
+        """
+        from terrainkit_robots.mesh.reader import STL_FORMATS
+
+        surface = self.surface(path)
+        is_stl = self.header(path).format in STL_FORMATS
+        return surface.faces.ravel() if is_stl else np.arange(len(surface.points))
 
     def is_readable(self, mesh: MeshFile) -> bool:
         """Return whether the vertices can be read."""
@@ -225,12 +238,14 @@ class Meshes:
         Raises:
             MeshError: If the file cannot be read or the mesh is flat.
         """
-        from terrainkit_robots.mesh.hull import convex_hull
+        from terrainkit_robots.mesh.hull import convex_hull, reduce_hull
 
         def make() -> Surface:
+            if max_vertices is not None:
+                return reduce_hull(self.hull(path), max_vertices)
             surface = self.surface(path)
             small = len(surface.faces) <= MAX_WELDED_FACES
-            return convex_hull((self.welded(path) if small else surface).points, max_vertices)
+            return convex_hull((self.welded(path) if small else surface).points)
 
         return self._cached(("hull", path, max_vertices), make)
 
@@ -318,7 +333,7 @@ class Meshes:
     def _scaled(self, mesh: MeshFile) -> Matrix:
         points = self.surface(mesh.path).points
         with np.errstate(all="ignore"):
-            scaled = points.astype(np.float64) * np.array(mesh.scale, np.float64)
+            scaled = np.multiply(points, mesh.scale, dtype=np.float64)
         if not (np.abs(scaled) < _MAX_COORDINATE).all():
             raise MeshError(f"has coordinates beyond {_MAX_COORDINATE:,.0f} m, or an invalid scale")
         return scaled

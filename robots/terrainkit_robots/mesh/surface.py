@@ -119,9 +119,11 @@ def signed_volume(surface: Surface) -> float:
 
 
 def welded(surface: Surface) -> Surface:
-    """Return the same triangles with duplicate points merged."""
+    """Return the same triangles with duplicate points merged; the surface itself without any."""
     points, indices = unique_points(surface.points)
-    return Surface(points=points, faces=indices[surface.faces])
+    if len(points) == len(surface.points):
+        return surface
+    return Surface(points=points, faces=indices.astype(np.int32)[surface.faces])
 
 
 def is_closed(surface: Surface) -> bool:

@@ -17,6 +17,7 @@ from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
 from terrainkit_robots.onboarding.source_model import described_model, load_source
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
+from terrainkit_robots.simulation.written_model import remove_drawings
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -194,11 +195,24 @@ def _compare(
 
 
 def _load_model(path: Path) -> tuple[Any, Any]:
-    """Return the specification and the model of a file."""
+    """Return the specification and the model of a file, without shapes that are only drawn."""
     import mujoco
 
     try:
         spec = mujoco.MjSpec.from_file(str(path))
+        written = {mesh.name: (mesh.file, mesh.scale.tolist()) for mesh in spec.meshes}
+        remove_drawings(spec)
+        kept = {mesh.name for mesh in spec.meshes}
+        for name, (file, scale) in written.items():
+            if name not in kept:
+                # One by one, because MuJoCo takes about 800 bytes for each face.
+                drawing = mujoco.MjSpec()
+                drawing.modelfiledir = spec.modelfiledir
+                drawing.add_mesh(name=name, file=file, scale=scale)
+                drawing.worldbody.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0
+                )
+                drawing.compile()
         return spec, spec.compile()
     except ValueError as error:
         reason = one_line(str(error))

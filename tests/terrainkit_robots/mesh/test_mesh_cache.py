@@ -1,3 +1,4 @@
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,19 @@ def mesh(tmp_path):
         return use_of(tmp_path / name, scale)
 
     return make
+
+
+def test_memory_of_an_stl_is_that_of_its_unique_vertices(mesh):
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    use, meshes = mesh(stl_of(ball)), Meshes()
+    meshes.exists(use.path)
+    tracemalloc.start()
+    meshes.vertices(use)
+    meshes.welded(use.path)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # a half of a vertex per face in single and in double precision, and three indices of 4 bytes
+    assert held < 1.2 * len(ball.faces) * (0.5 * (12 + 24) + 12)
 
 
 def test_scale_is_applied_to_vertices(mesh):

@@ -110,7 +110,8 @@ def _extreme_points(shape: BodyShape, pose: Matrix, meshes: Meshes) -> Matrix:
             lowest = radii**2 * local / max(float(np.linalg.norm(radii * local)), 1e-12)
             return np.asarray(rotation @ lowest + center)[None]
     assert geometry.mesh is not None
-    return np.asarray(meshes.vertices(geometry.mesh) @ rotation.T + center)
+    points = meshes.vertices(geometry.mesh) @ rotation.T + center
+    return np.asarray(points[meshes.listed_vertices(geometry.mesh.path)])
 
 
 def convex_hull(points: Matrix) -> Matrix:

@@ -160,6 +160,8 @@ class OverlapScene:
                 mesh = spec.add_mesh(name=f"{path.name} of link {shape.link}, shape {index}")
                 hull = self._meshes.hull(path)
                 mesh.uservert = (hull.points * shape.geometry.mesh.scale).ravel()
+                # MuJoCo computes the hull from the vertices. All faces cost four times the memory.
+                mesh.userface = hull.faces[0]
                 mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
                 geom_type = mujoco.mjtGeom.mjGEOM_MESH
                 spec.worldbody.add_geom(type=geom_type, meshname=mesh.name, **pose)
