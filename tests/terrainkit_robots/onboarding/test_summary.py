@@ -32,7 +32,9 @@ def lines(monkeypatch, stood):
             "report": SimpleNamespace(findings=findings),
             "fixed": (),
             "robot": SimpleNamespace(
-                files=dict(files), facts=SimpleNamespace(legs=legs, loops=(), joints=()), changes=changes
+                files=dict(files),
+                facts=SimpleNamespace(legs=legs, loops=(), joints=()),
+                changes=changes,
             ),
             "verification": checks,
             "configs": {},
