@@ -25,6 +25,7 @@ import cv2
 import numpy as np
 import yaml
 from config_schema import config_schema
+from diagrams import DRAWINGS
 from gallery import render_map, render_patches
 from numpy.typing import NDArray
 from rich.console import Console
@@ -409,6 +410,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
         "walk": draw_walk,
+        **{name: partial(draw, PICTURES / f"{name}.svg") for name, draw in DRAWINGS.items()},
     }
 
 

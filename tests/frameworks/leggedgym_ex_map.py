@@ -14,7 +14,7 @@ from pages import page_block
 
 name, output = sys.argv[1:]
 sys.argv[1:] = [f"--task={name}", "--headless", "--cpu", "--num_envs=8"]
-exec(page_block("integrations.md", "genesis_simulator.Terrain = "))
+exec(page_block("leggedgym_ex.md", "genesis_simulator.Terrain = "))
 cfg = task_registry.get_cfgs(name)[0]
 cfg.terrain.mesh_type, cfg.terrain.curriculum = "heightfield", True
 cfg.terrain.measure_heights, cfg.terrain.max_init_terrain_level = True, 1
