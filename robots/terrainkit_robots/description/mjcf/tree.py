@@ -6,6 +6,7 @@ the tree is written with one element per line, so that a line identifies an elem
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +45,9 @@ _EXCLUDED_ATTRIBUTES = {
 }
 """Attributes that make MuJoCo's parser allocate memory, and do not describe the robot."""
 
+_UNREAD_SECTIONS = ("deformable", "extension", "custom")
+"""Sections whose elements no robot has. Sensors are generated."""
+
 _EXCLUDED_TAGS = frozenset({"flexcomp", "deformable", "skin", "extension"})
 """Elements that are skipped: soft bodies, skins, and plugins that may not be installed."""
 
@@ -81,11 +85,13 @@ class Node:
             if child.tag in ("frame", "replicate"):
                 yield from child.elements()
 
-    def remove(self) -> None:
-        """Remove the node from the tree."""
-        if self.parent is not None:
-            self.parent.children.remove(self)
-            self.parent = None
+    def remove(self) -> bool:
+        """Remove the node from the tree; return False if it is the root."""
+        if self.parent is None:
+            return False
+        self.parent.children.remove(self)
+        self.parent = None
+        return True
 
     default_name: str = ""
     """Generated name of a body that has none."""
@@ -118,6 +124,9 @@ class MjcfTree:
     problems: list[Problem]
     sources: tuple[Path, ...]
     """Every file that was read."""
+
+    unread: Mapping[str, int] = field(default_factory=dict)
+    """Number of elements of each section that is not read, by tag."""
 
     complete: bool = True
     """Whether the trees contain the whole file; False if elements were skipped."""
@@ -183,12 +192,16 @@ def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
         message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
         reader.problems.append(Problem(code="XML002", message=message, source=root.source))
         root.tag = "mujoco"
+    if reader.too_deep:
+        message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
+        reader.problems.append(Problem(code="XML011", message=message, source=reader.too_deep[0]))
     complete = MjcfTree(
         root=root,
         attached=reader.attached,
         problems=reader.problems,
         sources=tuple(reader.files),
-        complete=reader.complete,
+        unread=reader.unread,
+        complete=reader.complete and not reader.too_deep,
     )
     limit_size(complete)
     return complete
@@ -216,8 +229,10 @@ class _TreeReader:
         self.files: list[Path] = []
         self.problems: list[Problem] = []
         self.attached: dict[str, Node] = {}
+        self.unread = Counter[str]()
         self.complete = True
-        self._deep = False
+        self.too_deep: list[Source] = []
+        """Elements that are not read, since they are nested too deeply."""
 
     def tree(self, main: XmlDocument, parents: tuple[Path, ...] = ()) -> Node:
         """Return the tree of a model; `parents` are the files of the models that attach it."""
@@ -237,7 +252,7 @@ class _TreeReader:
                     stack += [(child, part, parent, depth) for child in inner]
                 continue
             if depth > _MAX_DEPTH:
-                self._report_depth(source)
+                self.too_deep.append(source)
                 continue
             node = self._node(element, source, parent, folder)
             if node is None or not self._load_attached(node, (*parents, main.file)):
@@ -266,6 +281,8 @@ class _TreeReader:
         if tag == "body" and not node.name:
             self._unnamed += 1
             node.default_name = f"unnamed_body_{self._unnamed}"
+        if tag in _UNREAD_SECTIONS and len(element):
+            self.unread[tag] += len(element)
         if tag in _EXCLUDED_TAGS:
             self.complete = self.complete and tag != "flexcomp"
             return None
@@ -364,12 +381,6 @@ class _TreeReader:
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
 
-    def _report_depth(self, source: Source) -> None:
-        if not self._deep:
-            message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
-            self.problems.append(Problem(code="XML011", message=message, source=source))
-        self._deep, self.complete = True, False
-
 
 def _prefixed_name(name: str, element: "etree._Element") -> str:
     """Return a name as written, with its namespace prefix."""
@@ -391,23 +402,18 @@ def _real_path(path: Path) -> Path:
 
 def limit_size(tree: MjcfTree) -> None:
     """Keep the model small: remove replicas or, if that is not enough, everything."""
-    if sum(1 for _ in tree.nodes()) <= MAX_ELEMENTS:
-        if _total_size(tree) <= MAX_ELEMENTS:
-            return
-        replicas = [node for node in tree.nodes() if node.tag == "replicate"]
-        for node in replicas:
-            node.attributes["count"] = "1"
-        if replicas and _total_size(tree) <= MAX_ELEMENTS:
-            _report_size(tree, replicas[0], "replicas are not created")
-            tree.complete = False
-            return
-    _report_size(tree, tree.root, "the model is not read")
-    tree.root.children.clear()
-    tree.attached.clear()
+    if _total_size(tree) <= MAX_ELEMENTS:
+        return
+    replicas = [node for node in tree.nodes() if node.tag == "replicate"]
+    for node in replicas:
+        node.attributes["count"] = "1"
+    if replicas and _total_size(tree) <= MAX_ELEMENTS:
+        node, what = replicas[0], "replicas are not created"
+    else:
+        node, what = tree.root, "the model is not read"
+        tree.root.children.clear()
+        tree.attached.clear()
     tree.complete = False
-
-
-def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
     message = (
         f"number of elements: more than {MAX_ELEMENTS}, long attributes count as several; {what}, "
         "because MuJoCo's parser needs quadratic time"
@@ -416,14 +422,15 @@ def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
 
 
 def _total_size(tree: MjcfTree) -> int:
-    """Return the number of elements after replication, each attached copy counted.
+    """Return the number of elements, or after replication with each attached copy if it is more.
 
     Long attributes count as further elements.
     """
     sizes: dict[str, int] = {}
-    for key in reversed(tree.attached):  # attached models follow the models that name them
-        sizes[key] = _tree_size(tree, tree.attached[key], sizes)
-    return _tree_size(tree, tree.root, sizes)
+    # attached models follow the models that name them
+    for key, root in reversed([("", tree.root), *tree.attached.items()]):
+        sizes[key] = _tree_size(tree, root, sizes)
+    return max(sizes[""], sum(1 for _ in tree.nodes()))
 
 
 def _tree_size(tree: MjcfTree, root: Node, models: Mapping[str, int]) -> int:
