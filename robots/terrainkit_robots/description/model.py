@@ -467,6 +467,12 @@ class Actuator:
     stiffness: float | None = None
     """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
 
+    damping: float = 0.0
+    """Derivative gain on the joint [N m s/rad] or [N s/m]; 0 if it is a damping ratio."""
+
+    armature: float = 0.0
+    """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
+
     commands: tuple[float, float] | None = None
     """Range of the commanded force of a motor; None if it is unlimited or commands something
     else."""
@@ -553,7 +559,7 @@ class RobotModel:
     """Tendons; MJCF only."""
 
     left_out: tuple[str, ...] = ()
-    """Constraints and tendons of the file that the model does not have, one phrase each."""
+    """Parts of the file that the model does not have, such as constraints, one phrase each."""
 
     problems: tuple[Problem, ...] = ()
     """What could not be read."""
