@@ -435,11 +435,10 @@ class Joint:
     def range(self) -> tuple[float, float] | None:
         """Return the lower and upper limit [rad] or [m]; None if the joint has no valid limits."""
         limit = self.limit
-        if self.kind == "continuous" or limit is None or None in (limit.lower, limit.upper):
+        lower, upper = (limit.lower, limit.upper) if limit else (None, None)
+        if self.kind == "continuous" or lower is None or upper is None:
             return None
-        assert limit.lower is not None
-        assert limit.upper is not None
-        return (limit.lower, limit.upper) if limit.lower < limit.upper else None
+        return (lower, upper) if lower < upper else None
 
     @property
     def direction(self) -> Matrix:

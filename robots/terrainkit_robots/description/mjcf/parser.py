@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
-from terrainkit_robots.description.fix import number_fix
+from terrainkit_robots.description.fix import Fix, number_fix
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -53,8 +53,8 @@ _INFINITE_ALLOWED = frozenset({"ctrlrange", "forcerange", "actuatorfrcrange"})
 _OTHER_ATTRIBUTES = frozenset({"flag", "light"})
 """Elements whose attributes of the same names are something else."""
 
-_DEFAULTS = {"mass": "0", "pos": "0 0 0"}
-"""Values for missing attributes, so that the rest of the element is read."""
+_DEFAULTS = {"mass": "nan", "pos": "0 0 0"}
+"""Values for missing attributes, so that the rest of the element is read. A missing mass is NaN."""
 
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "fullinertia")
 
@@ -112,18 +112,20 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
         expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
-        tree.add_problem(
-            node,
-            "XML006",
-            f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-            + (", with decimal points and separated by spaces" if repaired else ""),
-            attribute=name,
-            fix=number_fix(node.source, name, repaired),
-        )
+        expected += ", with decimal points and separated by spaces" if repaired else ""
+        _report_number(tree, node, name, expected, number_fix(node.source, name, repaired))
         if repaired:
             node.attributes[name] = repaired
         else:
             del node.attributes[name]
+
+
+def _report_number(
+    tree: MjcfTree, node: Node, name: str, expected: str, fix: Fix | None = None
+) -> None:
+    got = truncate(node.attributes[name], 40)
+    message = f"{name} of <{node.tag}>: got {got!r}; expected {expected}"
+    tree.add_problem(node, "XML006", message, attribute=name, fix=fix)
 
 
 # Repairs
@@ -240,7 +242,6 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match["name"]
     if name not in node.attributes:
         return False
-    text = node.attributes.pop(name)
     counts = _COUNTS.get(name)
     if "large" in match[0]:
         expected = "a smaller number"
@@ -248,8 +249,8 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         expected = "other numbers"
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
-    message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-    tree.add_problem(node, "XML006", message, attribute=name)
+    _report_number(tree, node, name, expected)
+    del node.attributes[name]
     return True
 
 
@@ -260,7 +261,6 @@ def _missing_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         tree.add_problem(node, "XML013", message, attribute=name)
     if name in _DEFAULTS and name not in node.attributes:
         node.attributes[name] = _DEFAULTS[name]
-        node.defaults.add(name)
         return True
     return node.remove()
 

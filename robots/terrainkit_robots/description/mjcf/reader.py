@@ -266,10 +266,9 @@ class _SpecReader:
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         elif "diaginertia" in written.attributes:
             inertia = np.diag(body.inertia)
-        known = "mass" in written.attributes and "mass" not in written.defaults
         return Inertial(
             source=written.source,
-            mass=float(body.mass) * mass_scale if known else None,
+            mass=None if math.isnan(body.mass) else float(body.mass) * mass_scale,
             origin=origin,
             inertia=None if inertia is None else inertia * moments[0],
             attribute=_first(written, ("fullinertia", "diaginertia")),

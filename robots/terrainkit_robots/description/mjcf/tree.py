@@ -96,9 +96,6 @@ class Node:
     default_name: str = ""
     """Generated name of a body that has none."""
 
-    defaults: set[str] = field(default_factory=set)
-    """Attributes that were added for missing required ones."""
-
     @property
     def name(self) -> str:
         """Return the name of the node, or its generated name."""
@@ -155,13 +152,9 @@ class MjcfTree:
             )
         )
 
-    def roots(self) -> list[Node]:
-        """Return the roots of the model and the attached models."""
-        return [self.root, *self.attached.values()]
-
     def nodes(self) -> Iterator[Node]:
-        """Yield all nodes."""
-        for root in self.roots():
+        """Yield all nodes of the model and the attached models."""
+        for root in (self.root, *self.attached.values()):
             yield from root.walk()
 
     def write(self) -> tuple[str, dict[str, bytes], list[Node]]:
