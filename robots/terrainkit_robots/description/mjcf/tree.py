@@ -229,31 +229,34 @@ class _TreeReader:
 
     def tree(self, main: XmlDocument, parents: tuple[Path, ...] = ()) -> Node:
         """Return the tree of a model; `parents` are the files of the models that attach it."""
-        assert main.root is not None
         self.files.append(main.file)
         folder = main.file.parent
         included: dict[Path, tuple[Path, ...]] = {_real_path(main.file): ()}
-        top = Node(tag="", source=main.source(main.root), folder=folder)
-        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(main.root, main, top, 0)]
+        top = Node(tag="", source=main.source(_root(main)), folder=folder)
+        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(_root(main), main, top, 0)]
         while stack and self._count <= MAX_ELEMENTS:
             element, doc, parent, depth = stack.pop()
             source = doc.source(element)
-            if element.tag == "include":
-                part = self._load_include(element, doc, folder, included)
-                if part is not None and part.root is not None:
-                    inner = reversed(list(part.root.iterchildren(etree.Element)))
-                    stack += [(child, part, parent, depth) for child in inner]
-                continue
             if depth > _MAX_DEPTH:
                 self.too_deep.append(source)
                 continue
-            node = self._node(element, source, parent, folder)
-            if node is None or not self._load_attached(node, (*parents, main.file)):
+            try:
+                if element.tag == "include":
+                    part = self._load_include(element, doc, folder, included)
+                    inner = _root(part).iterchildren(etree.Element, reversed=True)
+                    stack += [(child, part, parent, depth) for child in inner]
+                    continue
+                node = self._node(element, source, parent, folder)
+                if node is not None and node.tag == "model":
+                    self._load_attached(node, (*parents, main.file))
+            except RobotFileError as error:
+                self._report(source, str(error), (element.get("file") or "").strip())
                 continue
-            parent.children.append(node)
-            self._count += 1
-            children = reversed(list(element.iterchildren(etree.Element)))
-            stack += [(child, doc, node, depth + 1) for child in children]
+            if node is not None:
+                parent.children.append(node)
+                self._count += 1
+                children = element.iterchildren(etree.Element, reversed=True)
+                stack += [(child, doc, node, depth + 1) for child in children]
         root = top.children[0]
         root.parent = None
         return root
@@ -294,85 +297,84 @@ class _TreeReader:
         doc: XmlDocument,
         folder: Path,
         included: dict[Path, tuple[Path, ...]],
-    ) -> XmlDocument | None:
-        """Return the document of an <include>; None with a problem if it cannot be read."""
-        source, name = doc.source(element), (element.get("file") or "").strip()
+    ) -> XmlDocument:
+        """Return the document of an <include>.
+
+        Raises:
+            RobotFileError: If it cannot be included.
+        """
+        name = (element.get("file") or "").strip()
         chain = (*included[_real_path(doc.file)], _real_path(doc.file))
-        if not name:
-            self._report(source, "<include> has no file", "")
-            return None
         if len(element):
-            self._report(
-                source, f"<include file={name!r}> has children; MuJoCo rejects the file", name
-            )
+            message = f"<include file={name!r}> has children; MuJoCo rejects the file"
+            self._report(doc.source(element), message, name)
         path = folder / name
         sibling = doc.file.parent / name
         if not self._exists(path) and self._exists(sibling):
             path = sibling
-        if _real_path(path) in included:
+        if name and _real_path(path) in included:
             how = "by itself" if _real_path(path) in chain else "twice"
-            self._report(source, f"{name} is included {how}; MuJoCo rejects the file", name)
-            return None
-        part = self._read(path, source, name)
-        if part is not None and part.root is not None:
-            included[_real_path(path)] = chain
-            self.files.append(path)
-            if not len(part.root):
-                self._report(source, f"{name} is empty; expected elements to include", name)
+            raise RobotFileError(f"{name} is included {how}; MuJoCo rejects the file")
+        part = self._read(path, name, "include")
+        included[_real_path(path)] = chain
+        self.files.append(path)
+        if not len(_root(part)):
+            raise RobotFileError(f"{name} is empty; expected elements to include")
         return part
 
     def _exists(self, path: Path) -> bool:
         return path in self._contents or exists(path)
 
-    def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
+    def _read(self, path: Path, name: str, tag: str) -> XmlDocument:
+        """Return a document with a root that an element names.
+
+        Raises:
+            RobotFileError: If it cannot be read.
+        """
+        if not name:
+            raise RobotFileError(f"<{tag}> has no file")
         if len(self.files) >= MAX_FILES or self._bytes > MAX_BYTES:
-            self._report(
-                source, f"{name} is not read: too many included files, or too much data", name
-            )
-            return None
+            raise RobotFileError(f"{name} is not read: too many included files, or too much data")
         try:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
-            self._report(source, f"{name}: {error}", name)
             self.complete = False
-            return None
+            raise RobotFileError(f"{name}: {error}") from None
         self._bytes += len(data)
         part = parse_xml(path, data)
         self.problems += part.problems
         if part.root is None:
-            self._report(source, f"{name} could not be parsed", name)
-            return None
+            raise RobotFileError(f"{name} could not be parsed")
         return part
 
-    def _load_attached(self, node: Node, parents: tuple[Path, ...]) -> bool:
-        """Read the model of a <model> element; return whether the element is kept."""
-        if node.tag != "model":
-            return True
+    def _load_attached(self, node: Node, parents: tuple[Path, ...]) -> None:
+        """Read the model of a <model> element.
+
+        Raises:
+            RobotFileError: If it cannot be attached.
+        """
         name = node.written.get("file", "")
-        if not name:
-            self._report(node.source, "<model> has no file", "")
-            return False
         path = node.folder / name
-        if _real_path(path) in map(_real_path, parents):
-            self._report(node.source, f"{name} attaches itself", name)
-            return False
-        part = self._read(path, node.source, name)
-        if part is None or part.root is None:
-            return False
-        if part.root.tag != "mujoco":
-            message = f"root element of {name}: got <{part.root.tag}>; expected <mujoco>"
-            self._report(node.source, message, name)
-            return False
+        if name and _real_path(path) in map(_real_path, parents):
+            raise RobotFileError(f"{name} attaches itself")
+        part = self._read(path, name, "model")
+        tag = _root(part).tag
+        if tag != "mujoco":
+            raise RobotFileError(f"root element of {name}: got <{tag}>; expected <mujoco>")
         key = f"attached_{len(self.attached)}.xml"
         self.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
         node.attributes["file"] = key
         self.attached[key] = self.tree(part, parents)
-        return True
 
     def _report(self, source: Source, message: str, subject: str) -> None:
         self.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
+
+
+def _root(doc: XmlDocument) -> "etree._Element":
+    assert doc.root is not None
+    return doc.root
 
 
 def _prefixed_name(name: str, element: "etree._Element") -> str:
