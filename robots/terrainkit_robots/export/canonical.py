@@ -94,12 +94,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
         links=tuple(links),
         joints=tuple(joint for joint, _ in joints),
         actuators=tuple(
-            Actuator(
-                name=joint.name,
-                source=joint.source,
-                joint=joint.name,
-                effort=joint.limit.effort if joint.limit else None,
-            )
+            Actuator(name=joint.name, source=joint.source, joint=joint.name, effort=joint.effort)
             for joint, name_before in joints
             if joint.moves and name_before in actuated
         ),

@@ -430,10 +430,9 @@ def _sensors(root: Any, extras: Extras) -> None:
     sensor = etree.SubElement(root, "sensor")
     if extras.imu is not None:
         for kind, name in _IMU:
-            element = etree.SubElement(sensor, kind, name=name)
-            if kind == "framequat":
-                element.set("objtype", "site")
-            element.set("objname" if kind == "framequat" else "site", extras.imu.name)
+            object_type = {"objtype": "site"} if kind == "framequat" else {}
+            target = "objname" if object_type else "site"
+            etree.SubElement(sensor, kind, name=name, **object_type, **{target: extras.imu.name})
     for foot in extras.feet:
         etree.SubElement(sensor, "touch", name=f"{foot.name}_contact", site=foot.name)
 

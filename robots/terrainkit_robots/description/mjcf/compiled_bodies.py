@@ -15,7 +15,7 @@ The compiled value of a placeholder is the scale of the value that it replaces.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,6 @@ class CompiledBodies:
 
     Args:
         spec: The parsed spec.
-        sites: The sites whose poses are needed. Others are not compiled.
         node_of: Function that returns the node of a MuJoCo element.
         report: Function that reports what MuJoCo rejects at a node.
         contents: File contents by path, which are used instead of files on disk.
@@ -65,7 +64,6 @@ class CompiledBodies:
     def __init__(
         self,
         spec: "mujoco.MjSpec",
-        sites: Iterable[Any],
         node_of: Callable[[Any], Node],
         report: Callable[[Node, str], None],
         contents: Mapping[Path, bytes],
@@ -87,7 +85,7 @@ class CompiledBodies:
             body = stack.pop()
             self._copy_body(body)
             stack += body.bodies
-        for site in sites:
+        for site in spec.sites:
             self._copy_shape(site)
         self._spec.compiler.degree = False
         self._spec.compiler.balanceinertia = True  # the inertia of huge geoms has rounding errors

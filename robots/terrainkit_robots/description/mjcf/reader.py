@@ -120,12 +120,7 @@ class _SpecReader:
 
         imu = find_imu(self._spec)
         try:
-            sites = [imu] if imu is not None else []
-            if self._spec.equalities or self._spec.tendons:
-                sites += [site for site in self._spec.sites if site != imu]
-            self._compiled = CompiledBodies(
-                self._spec, sites, self._node, self._report, self._contents
-            )
+            self._compiled = CompiledBodies(self._spec, self._node, self._report, self._contents)
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
             reason, _, location = str(error).removeprefix("Error: ").partition("\n")
             message = f"MuJoCo rejects the file: {reason}; the robot is not checked"
@@ -295,14 +290,13 @@ class _SpecReader:
             priority=int(geom.priority),
             condim=int(geom.condim),
             settings=settings_of(geom, self._new_geom, GEOM_SETTINGS),
+            fit_to_mesh=fitted,
         )
-        mesh = self._meshes.get(geom.meshname)
-        if mesh is None or not (shape == "mesh" or fitted):
-            return replace(geometry, fit_to_mesh=fitted)
-        file = mesh_file(mesh, self._node(mesh), bool(self._spec.strippath))
-        if file is not None:
-            geometry = mesh_geometry(geometry, mesh, file, self._compiled.mesh_scale(geom))
-        return replace(geometry, fit_to_mesh=fitted)
+        mesh = self._meshes.get(geom.meshname) if shape == "mesh" or fitted else None
+        file = mesh and mesh_file(mesh, self._node(mesh), bool(self._spec.strippath))
+        if file is None:
+            return geometry
+        return mesh_geometry(geometry, mesh, file, self._compiled.mesh_scale(geom))
 
     def _bits(self, geom: Any) -> tuple[int, int]:
         """Return contype and conaffinity."""
