@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
-from terrainkit_robots.description.fix import Fix, number_fix
+from terrainkit_robots.description.fix import number_fix
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -111,21 +111,24 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
         if not words or parse_numbers(" ".join(words), count) is not None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
-        expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
-        expected += ", with decimal points and separated by spaces" if repaired else ""
-        _report_number(tree, node, name, expected, number_fix(node.source, name, repaired))
-        if repaired:
-            node.attributes[name] = repaired
-        else:
-            del node.attributes[name]
+        _reject_number(tree, node, name, repaired=repaired)
 
 
-def _report_number(
-    tree: MjcfTree, node: Node, name: str, expected: str, fix: Fix | None = None
+def _reject_number(
+    tree: MjcfTree, node: Node, name: str, *, expected: str = "", repaired: str = ""
 ) -> None:
+    """Report an attribute that is not numbers, and repair or remove it."""
+    count = _COUNTS.get(name, (0,))[0]
+    expected = expected or ("a number" if count == 1 else f"{count or 'other'} numbers")
+    expected += ", with decimal points and separated by spaces" if repaired else ""
     got = truncate(node.attributes[name], 40)
     message = f"{name} of <{node.tag}>: got {got!r}; expected {expected}"
+    fix = number_fix(node.source, name, repaired)
     tree.add_problem(node, "XML006", message, attribute=name, fix=fix)
+    if repaired:
+        node.attributes[name] = repaired
+    else:
+        del node.attributes[name]
 
 
 # Repairs
@@ -242,15 +245,8 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match["name"]
     if name not in node.attributes:
         return False
-    counts = _COUNTS.get(name)
-    if "large" in match[0]:
-        expected = "a smaller number"
-    elif counts is None:
-        expected = "other numbers"
-    else:
-        expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
-    _report_number(tree, node, name, expected)
-    del node.attributes[name]
+    expected = "a smaller number" if "large" in match[0] else ""
+    _reject_number(tree, node, name, expected=expected)
     return True
 
 

@@ -312,36 +312,29 @@ class _SpecReader:
 
     def _read_joints(self, body: Any, node: Node, name: str) -> tuple[list[Link], list[Joint]]:
         """Return the joints of a body, and virtual links between them if there are several."""
-        parent, origin = self._links[body.parent], self._compiled.body_pose(body)
-        body_joints = list(body.joints)
-        if not body_joints:
-            fixed = Joint(
-                name=self._joints.add(f"{name}_fixed"),
-                source=node.source,
-                kind="fixed",
-                parent=parent,
-                child=name,
-                origin=origin,
-            )
-            return [], [fixed]
         links: list[Link] = []
         joints: list[Joint] = []
-        for k, joint in enumerate(body_joints, 1):
-            written = self._node(joint, node)
-            own = joint.name or self._joints.add(f"{name}_joint")
-            child = name if k == len(body_joints) else self._bodies.add(f"{name}:{own}")
+        parent, origin = self._links[body.parent], self._compiled.body_pose(body)
+        own_joints = self._own_joints(body, node, name)
+        for k, joint in enumerate(own_joints, 1):
+            child = name if k == len(own_joints) else self._bodies.add(f"{name}:{joint.name}")
             if child != name:
-                links.append(Link(name=child, source=written.source, virtual=True))
-            joints.append(
-                replace(
-                    self._joint(joint, written, own),
-                    parent=parent,
-                    child=child,
-                    origin=origin if k == 1 else np.eye(4),
-                )
-            )
-            parent = child
+                links.append(Link(name=child, source=joint.source, virtual=True))
+            joints.append(replace(joint, parent=parent, child=child, origin=origin))
+            parent, origin = child, np.eye(4)
         return links, joints
+
+    def _own_joints(self, body: Any, node: Node, name: str) -> list[Joint]:
+        """Return the joints of a body without their links, a fixed joint if it has none."""
+        if not len(body.joints):
+            fixed = self._joints.add(f"{name}_fixed")
+            return [Joint(name=fixed, source=node.source, kind="fixed", parent="", child="")]
+        return [
+            self._joint(
+                joint, self._node(joint, node), joint.name or self._joints.add(f"{name}_joint")
+            )
+            for joint in body.joints
+        ]
 
     def _joint(self, joint: Any, node: Node, name: str) -> Joint:
         """Return a joint without its parent and child."""
