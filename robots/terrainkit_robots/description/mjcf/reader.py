@@ -82,7 +82,7 @@ def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None)
         kind="mjcf",
         file=doc.file,
         source=mjcf.root.source,
-        sources=mjcf.sources,
+        sources=tuple(mjcf.sources),
     )
     if spec is not None:
         model = _SpecReader(mjcf, spec, lines, contents or {}).fill(model)

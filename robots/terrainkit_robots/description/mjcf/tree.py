@@ -115,14 +115,14 @@ class MjcfTree:
     """Trees of a model and of the models that it attaches."""
 
     root: Node
-    attached: dict[str, Node]
+    attached: dict[str, Node] = field(default_factory=dict)
     """Attached models by the file name that `model` elements refer to."""
 
-    problems: list[Problem]
-    sources: tuple[Path, ...]
+    problems: list[Problem] = field(default_factory=list)
+    sources: list[Path] = field(default_factory=list)
     """Every file that was read."""
 
-    unread: Mapping[str, int] = field(default_factory=dict)
+    unread: Counter[str] = field(default_factory=Counter)
     """Number of elements of each section that is not read, by tag."""
 
     complete: bool = True
@@ -178,26 +178,20 @@ def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
         doc: The main file; it has a root element.
         contents: File contents by path, which are used instead of the files on disk.
     """
-    reader = _TreeReader(contents)
-    reader.problems += doc.problems
-    root = reader.tree(doc)
-    if root.tag != "mujoco":
-        message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
-        reader.problems.append(Problem(code="XML002", message=message, source=root.source))
-        root.tag = "mujoco"
+    root = Node(tag="", source=doc.source(_root(doc)), folder=doc.file.parent)
+    mjcf = MjcfTree(root=root, problems=list(doc.problems))
+    reader = _TreeReader(mjcf, contents)
+    mjcf.root = reader.tree(doc)
+    if mjcf.root.tag != "mujoco":
+        message = f"root element: got <{mjcf.root.tag}>, a part of a model; expected <mujoco>"
+        mjcf.add_problem(mjcf.root, "XML002", message, subject="")
+        mjcf.root.tag = "mujoco"
     if reader.too_deep:
         message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
-        reader.problems.append(Problem(code="XML011", message=message, source=reader.too_deep[0]))
-    complete = MjcfTree(
-        root=root,
-        attached=reader.attached,
-        problems=reader.problems,
-        sources=tuple(reader.files),
-        unread=reader.unread,
-        complete=reader.complete and not reader.too_deep,
-    )
-    limit_size(complete)
-    return complete
+        mjcf.problems.append(Problem(code="XML011", message=message, source=reader.too_deep[0]))
+        mjcf.complete = False
+    limit_size(mjcf)
+    return mjcf
 
 
 def is_allowed(tag: str, attribute: str = "") -> bool:
@@ -212,24 +206,20 @@ def _excluded_attributes(tag: str) -> set[str]:
 
 
 class _TreeReader:
-    """Read the files of a model and collect their problems."""
+    """Read the files of a model into a tree."""
 
-    def __init__(self, contents: Mapping[Path, bytes]) -> None:
+    def __init__(self, mjcf: MjcfTree, contents: Mapping[Path, bytes]) -> None:
+        self._mjcf = mjcf
         self._contents = contents
         self._bytes = 0
         self._count = 0
         self._unnamed = 0
-        self.files: list[Path] = []
-        self.problems: list[Problem] = []
-        self.attached: dict[str, Node] = {}
-        self.unread = Counter[str]()
-        self.complete = True
         self.too_deep: list[Source] = []
         """Elements that are not read, since they are nested too deeply."""
 
     def tree(self, main: XmlDocument, parents: tuple[Path, ...] = ()) -> Node:
         """Return the tree of a model; `parents` are the files of the models that attach it."""
-        self.files.append(main.file)
+        self._mjcf.sources.append(main.file)
         folder = main.file.parent
         included: dict[Path, tuple[Path, ...]] = {_real_path(main.file): ()}
         top = Node(tag="", source=main.source(_root(main)), folder=folder)
@@ -278,9 +268,9 @@ class _TreeReader:
             self._unnamed += 1
             node.default_name = f"unnamed_body_{self._unnamed}"
         if tag in _UNREAD_SECTIONS and len(element):
-            self.unread[tag] += len(element)
+            self._mjcf.unread[tag] += len(element)
         if tag in _EXCLUDED_TAGS:
-            self.complete = self.complete and tag != "flexcomp"
+            self._mjcf.complete = self._mjcf.complete and tag != "flexcomp"
             return None
         if tag == "plugin" and parent.tag == "actuator":
             node.tag = "general"  # it acts on a joint like any other actuator
@@ -317,7 +307,7 @@ class _TreeReader:
             raise RobotFileError(f"{name} is included {how}; MuJoCo rejects the file")
         part = self._read(path, name, "include")
         included[_real_path(path)] = chain
-        self.files.append(path)
+        self._mjcf.sources.append(path)
         if not len(_root(part)):
             raise RobotFileError(f"{name} is empty; expected elements to include")
         return part
@@ -333,16 +323,16 @@ class _TreeReader:
         """
         if not name:
             raise RobotFileError(f"<{tag}> has no file")
-        if len(self.files) >= MAX_FILES or self._bytes > MAX_BYTES:
+        if len(self._mjcf.sources) >= MAX_FILES or self._bytes > MAX_BYTES:
             raise RobotFileError(f"{name} is not read: too many included files, or too much data")
         try:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
-            self.complete = False
+            self._mjcf.complete = False
             raise RobotFileError(f"{name}: {error}") from None
         self._bytes += len(data)
         part = parse_xml(path, data)
-        self.problems += part.problems
+        self._mjcf.problems += part.problems
         if part.root is None:
             raise RobotFileError(f"{name} could not be parsed")
         return part
@@ -361,13 +351,13 @@ class _TreeReader:
         tag = _root(part).tag
         if tag != "mujoco":
             raise RobotFileError(f"root element of {name}: got <{tag}>; expected <mujoco>")
-        key = f"attached_{len(self.attached)}.xml"
-        self.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
+        key = f"attached_{len(self._mjcf.attached)}.xml"
+        self._mjcf.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
         node.attributes["file"] = key
-        self.attached[key] = self.tree(part, parents)
+        self._mjcf.attached[key] = self.tree(part, parents)
 
     def _report(self, source: Source, message: str, subject: str) -> None:
-        self.problems.append(
+        self._mjcf.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
 
