@@ -229,7 +229,7 @@ def _reference(joint: Any) -> float:
 def ancestors(body: Any) -> list[Any]:
     """Return a body and the bodies that carry it, without the world."""
     found = []
-    while body is not None and body.parent is not None:
+    while body.name != WORLD:  # to ask for the parent of the world crashes MuJoCo 3.11
         found.append(body)
         body = body.parent
     return found

@@ -278,7 +278,7 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         tree.add_problem(duplicates[0], "TRE001", message)
     else:
         _report_rejected(tree, node, match[0])
-    names = UniqueNames(n.attributes.get("name", "") for n in tree.nodes())
+    names = UniqueNames([name, *(n.attributes.get("name", "") for n in tree.nodes())])
     for duplicate in duplicates:
         duplicate.attributes["name"] = names.add(name)
     return True
