@@ -50,8 +50,8 @@ _COUNTS: Mapping[str, tuple[int, ...]] = {
 _INFINITE_ALLOWED = frozenset({"ctrlrange", "forcerange", "actuatorfrcrange"})
 """Ranges that may be infinite."""
 
-_OTHER_ATTRIBUTES = frozenset({"flag", "light"})
-"""Elements whose attributes of the same names are something else."""
+_OTHER_VALUES = frozenset({("flag", "gravity"), ("flag", "frictionloss"), ("light", "range")})
+"""Elements and attributes whose values are words, or of another number."""
 
 _DEFAULTS = {"mass": "nan", "pos": "0 0 0"}
 """Values for missing attributes, so that the rest of the element is read. A missing mass is NaN."""
@@ -101,7 +101,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
     MuJoCo reports only one at a time, and accepts NaN.
     """
     for name, text in list(node.attributes.items()):
-        if name not in _COUNTS or node.tag in _OTHER_ATTRIBUTES:
+        if name not in _COUNTS or (node.tag, name) in _OTHER_VALUES:
             continue
         words = text.lower().replace("+", "").split()
         if name in _INFINITE_ALLOWED and any(word in ("inf", "-inf") for word in words):
