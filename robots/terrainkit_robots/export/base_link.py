@@ -6,15 +6,12 @@ joints to it, and each of two arms is fixed to it. Other formats require one bas
 
 import itertools
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import WORLD, Joint, Link
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
 
-
-def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":
+def with_world_base(facts: Facts, *, floating: bool | None = None) -> Facts:
     """Return the robot with the world as its base link, if its joints require that.
 
     The robot is unchanged unless it is an MJCF whose first joint moves it relative to the world, or
@@ -42,8 +39,6 @@ def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":
     ]
     if actuated == [base_name] and not world_joints[base_name].moves:
         return facts
-    from terrainkit_robots.analysis.facts import Facts
-
     world = Link(name=WORLD, source=model.source, virtual=True)
     changed = replace(
         model,
@@ -51,17 +46,15 @@ def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":
         joints=tuple(j for j in model.joints if j.parent != WORLD or j.child in actuated),
         floating=False,
     )
-    return Facts(changed, facts.meshes, spec=facts.spec)
+    return facts.with_model(changed)
 
 
-def _with_free_base(facts: "Facts") -> "Facts":
+def _with_free_base(facts: Facts) -> Facts:
     """Return the robot without the joints between the world and its first body."""
     order = [facts.tree.links[name] for name in facts.tree.order]
     removed = {link.name for link in itertools.takewhile(lambda link: link.virtual, order)}
     if not removed or len(removed) == len(order):
         return facts
-    from terrainkit_robots.analysis.facts import Facts
-
     changed = replace(
         facts.model,
         links=tuple(link for link in facts.model.links if link.name not in removed),
@@ -71,14 +64,14 @@ def _with_free_base(facts: "Facts") -> "Facts":
         ),
         floating=True,
     )
-    return Facts(changed, facts.meshes, spec=facts.spec)
+    return facts.with_model(changed)
 
 
 def _constrains(joint: Joint) -> bool:
     return joint.moves or joint.kind == "fixed"
 
 
-def _is_actuated(facts: "Facts", root: str) -> bool:
+def _is_actuated(facts: Facts, root: str) -> bool:
     """Return whether an actuator acts on a joint below a root link, or on the joint above it."""
     motors = {motor.joint for motor in facts.model.actuators}
     subtree = {root}

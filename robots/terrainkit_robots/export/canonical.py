@@ -6,7 +6,6 @@ removed and listed in `changes`.
 """
 
 import re
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,12 +94,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
         links=tuple(links),
         joints=tuple(joint for joint, _ in joints),
         actuators=tuple(
-            Actuator(
-                name=joint.name,
-                source=joint.source,
-                joint=joint.name,
-                effort=joint.limit.effort if joint.limit else None,
-            )
+            Actuator(name=joint.name, source=joint.source, joint=joint.name, effort=joint.effort)
             for joint, name_before in joints
             if joint.moves and name_before in actuated
         ),
@@ -168,9 +162,7 @@ def plain_name(model: RobotModel) -> str:
 
 
 def _links(facts: Facts, changes: list[str]) -> list[Link]:
-    index = {name: place for place, name in enumerate(facts.tree.order)}
-    links = [link for body in facts.bodies for link in body.links]
-    links.sort(key=lambda link: index[link.name])
+    links = [facts.tree.links[name] for name in facts.tree.order if name in facts.body_of]
     left = [name for name in facts.tree.links if name not in facts.body_of]
     if left:
         changes.append(f"removed {names(left)}: not part of the kinematic tree")
@@ -195,17 +187,14 @@ def has_unknown_inertia(inertial: Inertial | None) -> bool:
 
 def _joints(facts: Facts, changes: list[str]) -> list[tuple[Joint, str]]:
     """Return the joint of each link except the base, and its original name."""
-    index = {name: place for place, name in enumerate(facts.tree.order)}
     base = facts.bodies[0].top.name
     bodies = {body.top.name: body for body in facts.bodies}
-    inside = sorted((n for n in facts.body_of if n != base), key=lambda n: index[n])
-    parent_joints = [facts.tree.parent_joint[name] for name in inside]
-    name_counts = Counter(joint.name for joint in parent_joints)
+    inside = [name for name in facts.tree.order if name in facts.body_of and name != base]
     mimic_joint_names = {joint.name for joint in mimic_joints(facts.joints)}
     used_names, result = set[str](), []
-    for joint in parent_joints:
+    for joint in (facts.tree.parent_joint[name] for name in inside):
         name = joint.name or f"{joint.child}_joint"
-        if name_counts[joint.name] > 1 and name in used_names:
+        if name in used_names:
             name = free_name(f"{joint.child}_joint", used_names)
             changes.append(
                 f"renamed the joint of {joint.child} to {name}: duplicate name {joint.name}"
