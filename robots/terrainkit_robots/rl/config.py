@@ -229,6 +229,13 @@ class Rewards(Config):
     and times of sqrt(leg length / g). A reward with the scale 0 is not computed.
     """
 
+    units: Literal["robot", "SI"] = "robot"
+    """Units of the scales: the robot's mass and leg length, which suit robots of any size; or SI,
+    as in legged_gym."""
+    only_positive_rewards: bool = False
+    """Whether the sum of all rewards but `termination` is at least 0 in each step, as in
+    legged_gym."""
+
     # The units in `rewards.UNITS` make the scales dimensionless. With the 15 kg and 0.448 m of the
     # bundled quadruped, many are legged_gym's; the comments give them in SI units. The ratio of the
     # two tracking scales, 2, is legged_gym's.
