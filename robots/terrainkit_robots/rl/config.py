@@ -7,7 +7,7 @@ Subclass `Task`, or one of its sections, for a task of your own; see docs/adding
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from msgspec import Meta
 
@@ -25,6 +25,7 @@ from terrainkit.settings.type_hint import (
     PositiveFloat,
     PositiveInt,
 )
+from terrainkit_robots.rl.legged_gym_names import pasted_settings
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
 Duration = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
@@ -501,6 +502,24 @@ class Task(Config):
     policy: Policy = field(default_factory=Policy)
     algorithm: Algorithm = field(default_factory=Algorithm)
     runner: Runner = field(default_factory=Runner)
+
+    @classmethod
+    def from_table(
+        cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
+    ) -> Self:
+        """Return the task that a TOML table describes; see `Config.from_table`.
+
+        The error about a setting of legged_gym names ours.
+        """
+        try:
+            return super().from_table(table, default, path)
+        except ConfigError:
+            for setting, message in pasted_settings(table):
+                try:
+                    super().from_table(setting, default, path)
+                except ConfigError:
+                    raise ConfigError(message) from None
+            raise
 
     def __post_init__(self) -> None:
         """Validate the sections, and values that depend on each other."""
