@@ -283,7 +283,8 @@ def config_page() -> str:
         NOTE,
         "The keys of each TOML file. An unknown key or an invalid value is an error that names it.",
         'The string "none" stands for no value.',
-        "[Names of legged_gym](legged_gym_names.md) compares the settings of a training.\n",
+        "[Names of legged_gym](legged_gym_names.md) compares the settings of a training, and",
+        "`terrainkit import-config` translates a configuration of legged_gym.\n",
     ]
     for title, config in CONFIGS.items():
         parts += [f"## {title}\n", f"{inspect.getdoc(config).splitlines()[0]}\n"]
