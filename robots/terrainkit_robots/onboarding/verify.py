@@ -10,7 +10,6 @@ from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
-from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
 from terrainkit_robots.onboarding.dynamics import dynamics_differences
 from terrainkit_robots.onboarding.equivalence import (
@@ -116,8 +115,9 @@ def verify(
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
         urdf, scene = (executor.submit(_load_model, folder / name) for name in (URDF, SCENE))
+        hinged = with_hinges_for_balls(source)
         reference = reference_kinematics(
-            with_world_base(with_hinges_for_balls(source), floating=floating), robot.facts
+            hinged.with_free_base() if floating else hinged, robot.facts
         )
     (_, urdf_model), (scene_spec, scene_model) = urdf.result(), scene.result()
     equivalences = compare_models(reference, {URDF: urdf_model, MJCF: scene_model})

@@ -14,6 +14,9 @@ from terrainkit_robots.transforms import axis_angle_to_matrix
 MAX_LIMITED_RANGE = 4 * np.pi
 """Range of a joint with useful limits, at most [rad]. Exporters write up to 1e16 for wheels."""
 
+_MIN_WHEEL_RANGE = 6.2
+"""Range of the joint of a wheel, at least [rad]: exporters write -3.14 to 3.14 without limits."""
+
 _MAX_BALANCED_OFFSET = 0.1
 """Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel or a
 propeller. Parts of legs have more than 1."""
@@ -50,7 +53,7 @@ def is_balanced(body: Body, parents: Collection[int | None]) -> bool:
 def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     """Return whether the last body of a leg is a wheel.
 
-    A wheel turns without limits, and its mass and its collision shapes are round about the axis.
+    A wheel makes a whole turn, and its mass and its collision shapes are round about the axis.
     The mass alone does not tell: the center of mass of a foot may be on the axis of an ankle.
 
     Args:
@@ -59,7 +62,8 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     """
     joint = body.joint
     assert joint is not None
-    if not turns_without_limits(joint):
+    lower, upper = joint.range or (-np.inf, np.inf)
+    if joint.kind == "prismatic" or upper - lower < _MIN_WHEEL_RANGE:
         return False
     shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, meshes)]
     if not shapes:
