@@ -124,7 +124,8 @@ class Facts:
         tree = build_tree(self.model)
         if not self.base_joints:
             return tree
-        return build_tree(with_free_base(self.model, tree, self.base_joints[-1].child))
+        base = self.base_joints[-1].child
+        return build_tree(with_free_base(self.model, tree, base), base)
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

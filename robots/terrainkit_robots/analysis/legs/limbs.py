@@ -28,18 +28,14 @@ MIN_LEG_SCORE = 1.5
 _OTHER_NAME_COST = 1.0
 """Cost of names of other limbs, if the robot stands without this one."""
 
-# Chosen on 39 robots, together with the scores: a foot near the ground scores 1, or 0.5 if it is
-# only low, a mirror image 0.5, names of legs 0.5.
+# A foot near the ground scores 1, or 0.5 if it is only low, as that of a leg with a wrong length; a
+# mirror image scores 0.5, names of legs 0.5.
 _NEAR_GROUND, _LOW = 0.12, 0.25
 """Height of a foot above the ground over the height of the robot at zero."""
 
 _MIN_ARM_HEIGHT = 0.5
 """A limb that ends this high above the rest of the robot, such as wheels or a pedestal, is an arm.
 Over the height of the robot. A leg that is folded at zero ends lower above the belly."""
-
-_MIN_ARM_RISE = 0.25
-"""The same height over the length of the limb, for robots that are flat at zero: the legs of a
-spider that are stretched sideways have 0.1, arms of published robots more than 0.5."""
 
 _MAX_MIRROR_ERROR = 0.05
 """Distance of a leaf to the mirror image of another one, at most, over the size of the robot."""
@@ -158,10 +154,9 @@ def detect_limbs(
     def height_score(leaf: Chain) -> float:
         foot = float(leaf.tip[2])
         if leaf in surrounding and leaf.points[0][2] - _length(leaf, 0) < rest:
-            return 1.0 - is_fixed_base / 2  # stretched sideways at zero; it reaches the ground
-        min_rise = max(_MIN_ARM_HEIGHT * height, _MIN_ARM_RISE * _length(leaf, 0))
+            return 1.0  # it reaches the ground, also if it is stretched sideways at zero
         ratio = (foot - ground) / height
-        is_arm = foot - rest > min_rise
+        is_arm = foot - rest > _MIN_ARM_HEIGHT * height
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
     limbs = [
@@ -348,13 +343,13 @@ def _leaves(
 
 def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:
     """Return the lower and upper corner of the bounding box of the robot at zero."""
+    shapes = (
+        replace(shape, pose=body.zero_pose @ shape.pose)
+        for body in bodies
+        for shape in body.collisions
+    )
     corners = [body.zero_pose[:3, 3] for body in bodies]
-    for body in bodies:
-        pose = body.zero_pose
-        box = bounds(body.collisions, meshes)
-        if box is not None:
-            grid = np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
-            corners += list(grid @ pose[:3, :3].T + pose[:3, 3])
+    corners += list(box) if (box := bounds(shapes, meshes)) is not None else []
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
@@ -386,8 +381,8 @@ def _make_limb(
         for other in leaves
     )
     score += 0.5 * has_image
-    is_hand = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
     is_other = other_names > leg_names
+    is_hand = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
     is_finger = (is_other and 2 * fingers > other_names) or (is_hand and not leg_names)
     score += 0.5 * (leg_names > other_names) - _OTHER_NAME_COST * is_finger
     return Limb(

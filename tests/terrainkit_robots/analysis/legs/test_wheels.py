@@ -45,9 +45,7 @@ def body_at_axis(form='cylinder radius="0.1" length="0.05"', center="0 0 0", rpy
         (body_at_axis(rpy="0 0 0"), {}, "ankle"),  # a cylinder across the axis
         (link("END", inertia=ROUND), {}, "ankle"),  # without shapes
         (body_at_axis(center="0 0.5 0"), {}, "wheel"),  # along the axis
-        # The radius of gyration is sqrt(0.03 / 2) = 0.1225 m, and a quarter of it 0.0306 m.
-        (link("END", ball(0.02), center="0.0305 0 0", inertia=HEAVY), {}, "wheel"),
-        (link("END", ball(0.02), center="0.0307 0 0", inertia=HEAVY), {}, "ankle"),
+        (link("END", ball(0.02), center="0.1 0 0", inertia=HEAVY), {}, "wheel"),  # and its motor
         # Off the axis by a ninth of its radius, a ball has radii of 10/9 to 8/9: 1.25.
         (link("END", ball(0.02, "0 0 0.0022"), inertia=HEAVY), {}, "wheel"),
         (link("END", ball(0.02, "0 0 0.0023"), inertia=HEAVY), {}, "ankle"),
