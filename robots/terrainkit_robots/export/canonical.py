@@ -27,7 +27,6 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
-from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
 
@@ -59,10 +58,10 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: got no links; expected a robot")
     changes: list[str] = []
-    original, facts = facts, with_hinges_for_balls(facts)
-    if facts is not original:
+    hinged = with_hinges_for_balls(facts)
+    if hinged is not facts:
         changes.append("replaced each ball joint by three hinges")
-    facts = with_world_base(facts, floating=floating)
+    facts = hinged.with_free_base() if floating else hinged
     links = _links(facts, changes)
     joints = _joints(facts, changes)
     floating = has_floating_base(facts) if floating is None else floating
@@ -70,7 +69,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
     link_names = {link.name for link in links}
     if WORLD in link_names:
         new_name = free_name(f"{WORLD}_link", link_names)
-        if WORLD in original.body_of:
+        if not facts.tree.links[WORLD].virtual:
             changes.append(f"renamed link {WORLD} to {new_name}: MuJoCo reserves the name {WORLD}")
         else:
             attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
