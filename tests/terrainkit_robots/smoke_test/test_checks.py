@@ -60,7 +60,7 @@ def test_bundled_robot_can_be_trained(biped):
         "spawn height",
         "observation policy",
         "observation privileged",
-        "stands for 0.5 s with zero action",
+        "stands with zero action",
         "standing is not tracking",
         "action scale",
         "joints follow their targets",
