@@ -19,6 +19,7 @@ def arrays(terrain_map: TerrainMap, position: NDArray[np.float32], ids: NDArray[
     scan = perception.HeightScan(terrain_map)
     assert_type(scan.below(position, position[:, 2]), Array)
     assert_type(scan.points(position, position[:, 2]), tuple[Array, Array, Array])
+    assert_type(perception.quat_to_yaw(position), Array)
     assert_type(perception.EdgeMap(terrain_map).is_foothold(position), Array)
     assert_type(update_levels(ids, [1.0], rows=3, seed=0), Array)
 
@@ -26,6 +27,7 @@ def arrays(terrain_map: TerrainMap, position: NDArray[np.float32], ids: NDArray[
 def tensors(terrain_map: TerrainMap, position: torch.Tensor, ids: torch.Tensor) -> None:
     scan = perception.HeightScan(terrain_map)
     assert_type(scan.below(position, position[:, 2]), torch.Tensor)
+    assert_type(perception.quat_to_yaw(position), torch.Tensor)
     rays, camera = perception.RayCaster(terrain_map), perception.depth_directions(4, 3)
     assert_type(rays.sense(position, position, camera), torch.Tensor)
     share = CommandProgress.zeros(3).of_episodes(ids, ids == 0, distance=4.0)
