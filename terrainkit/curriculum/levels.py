@@ -16,7 +16,7 @@ def update_levels(
     seed: Seed,
     top_levels: int = 3,
 ) -> Array:
-    """Return the level of each environment after an episode.
+    """Return the level of each environment after an episode, as a `LevelSampler` assigns it.
 
     An environment moves up with a progress of 1, and down with a progress below 1/2. Otherwise it
     stays. An environment that moves up from the last row is assigned one of the last `top_levels`

@@ -285,9 +285,9 @@ class TerrainMap:
         return edit_map(self, heights, solids)
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Assign patches to `num_envs` environments; see `terrainkit.curriculum`.
+        """Assign patches to `num_envs` environments, distributed over the spawn positions.
 
-        The environments of a patch are distributed over its spawn positions.
+        For levels that change during training, a sampler of `terrainkit.curriculum` is recommended.
 
         Warns:
             TerrainkitWarning: if patches have several spawn positions, but too few for their
@@ -318,7 +318,7 @@ class TerrainMap:
     def update_levels(
         self, levels: Array, progress: ArrayLike, *, seed: Seed, top_levels: int = 3
     ) -> Array:
-        """Return the levels after an episode; see `terrainkit.update_levels`."""
+        """Return levels kept elsewhere after an episode; see `terrainkit.update_levels`."""
         rows = len(self.difficulty)
         return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
 
