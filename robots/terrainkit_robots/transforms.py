@@ -175,30 +175,6 @@ def quat_rotate_inverse(quat: FloatArray, vector: FloatArray) -> FloatArray:
     return np.stack(components, axis=1)
 
 
-def projected_gravity(quat: FloatArray) -> FloatArray:
-    """Return the unit vector of gravity in body frames, shape (n, 3).
-
-    Args:
-        quat: Unit quaternions (w, x, y, z) of the bodies, shape (n, 4).
-    """
-    w, x, y, z = quat.T
-    return np.stack([2 * (w * y - x * z), -2 * (w * x + y * z), 2 * (x * x + y * y) - 1], axis=1)
-
-
-def quat_to_yaw(quat: FloatArray) -> FloatArray:
-    """Return the yaw of unit quaternions.
-
-    Args:
-        quat: Quaternions (w, x, y, z), shape (n, 4).
-
-    Returns:
-        Yaw [rad], shape (n,).
-    """
-    w, x, y, z = quat.T
-    yaw: FloatArray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return yaw
-
-
 def wrap_to_pi(angle: FloatArray) -> FloatArray:
     """Wrap angles to the range from -pi to pi.
 

@@ -1,13 +1,20 @@
 """Arrays of callers: numpy arrays, lists, or tensors of torch on any device."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.type_hint import show
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+# The order matters: without torch, mypy finds that results of arrays are arrays.
+Array = TypeVar("Array", "Tensor", NDArray[Any])
+"""A numpy array or a tensor of torch; the result is of the same kind."""
 
 Seed = int | Sequence[int]
 """Seed of random numbers, such as (seed, iteration)."""
@@ -34,7 +41,7 @@ def to_numpy(name: str, values: Any) -> NDArray[Any]:
         raise ConfigError(f"{name}: got values of {values.dtype}; expected {expected}") from None
 
 
-def like(array: NDArray[Any], original: Any) -> Any:
+def like(array: NDArray[Any], original: Array) -> Array:
     """Return an array as a tensor on the device of `original` if that is a tensor of torch.
 
     Args:
@@ -45,7 +52,7 @@ def like(array: NDArray[Any], original: Any) -> Any:
         return array
     import torch
 
-    return torch.as_tensor(array, device=original.device)
+    return cast("Array", torch.as_tensor(array, device=original.device))
 
 
 def to_indices(name: str, values: Any, size: int, number: int | None = None) -> NDArray[np.int64]:

@@ -1,13 +1,13 @@
 """The patches that environments start on: levels, columns and spawn positions."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import Seed, like, make_rng, to_indices, to_numpy
+from terrainkit.curriculum.arrays import Array, Seed, like, make_rng, to_indices, to_numpy
 from terrainkit.settings.type_hint import PositiveInt, convert
 
 
@@ -63,7 +63,9 @@ def assign_levels(
     return levels, columns
 
 
-def assign_spawns(spawns: NDArray[np.float32], levels: Any, columns: Any) -> tuple[Any, int]:
+def assign_spawns(
+    spawns: NDArray[np.float32], levels: Array, columns: ArrayLike
+) -> tuple[Array, int]:
     """Distribute the environments of each patch over its spawn positions.
 
     Args:
@@ -87,12 +89,12 @@ def assign_spawns(spawns: NDArray[np.float32], levels: Any, columns: Any) -> tup
 
 
 def resample_columns(
-    levels: Any,
-    columns: Any,
+    levels: ArrayLike,
+    columns: Array,
     terrain_types: NDArray[np.int32],
     *,
     seed: Seed,
-) -> Any:
+) -> Array:
     """Return a random column with the same terrain type in the same row for each environment.
 
     Patches of the same row and terrain type are variants: they have the same difficulty and

@@ -1,23 +1,22 @@
 """The game-inspired curriculum: environments move to harder rows when they succeed."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
-from terrainkit.curriculum.arrays import Seed, like, make_rng, to_indices, to_progress
+from terrainkit.curriculum.arrays import Array, Seed, like, make_rng, to_indices, to_progress
 from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
 from terrainkit.settings.type_hint import PositiveInt, convert
 
 
 def update_levels(
-    levels: Any,
-    progress: Any,
+    levels: Array,
+    progress: ArrayLike,
     *,
     rows: int,
     seed: Seed,
     top_levels: int = 3,
-) -> Any:
-    """Return the level of each environment after an episode.
+) -> Array:
+    """Return the level of each environment after an episode, as a `LevelSampler` assigns it.
 
     An environment moves up with a progress of 1, and down with a progress below 1/2. Otherwise it
     stays. An environment that moves up from the last row is assigned one of the last `top_levels`

@@ -4,9 +4,9 @@ from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import like, to_numpy
+from terrainkit.curriculum.arrays import Array, like, to_numpy
 from terrainkit.errors import ConfigError
 
 FloatArray = NDArray[np.float64]
@@ -107,8 +107,8 @@ class CommandProgress:
         self.yaw[:] += to_numpy("yaw_rate", yaw_rate) * dt
 
     def of_episodes(
-        self, env_ids: Any, fallen: Any, distance: float, *, left_map: Any = False
-    ) -> Any:
+        self, env_ids: Array, fallen: ArrayLike, distance: float, *, left_map: ArrayLike = False
+    ) -> Array:
         """Return the progress of episodes that end, as the samplers expect it.
 
         - 1 if the robot crossed: its progress and its distance from the start were both at least

@@ -4,15 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import (
-    like,
-    to_indices,
-    to_numbers,
-    to_numpy,
-    to_progress,
-)
+from terrainkit.curriculum.arrays import Array, like, to_indices, to_numbers, to_numpy, to_progress
 from terrainkit.curriculum.assignment import assign_levels
 from terrainkit.curriculum.statistics import PatchStatistics
 from terrainkit.errors import ConfigError
@@ -55,7 +49,9 @@ class PatchSampler:
         self.statistics = PatchStatistics.empty(rows, cols)
         self._seed, self._updates = seed, 0
 
-    def update(self, env_ids: Any, progress: Any, returns: Any = None) -> tuple[Any, Any]:
+    def update(
+        self, env_ids: Array, progress: ArrayLike, returns: ArrayLike | None = None
+    ) -> tuple[Array, Array]:
         """Record episodes that ended, and assign the patches of the next ones.
 
         Args:

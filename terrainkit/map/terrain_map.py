@@ -16,7 +16,7 @@ from terrainkit.curriculum import (
     resample_columns,
     update_levels,
 )
-from terrainkit.curriculum.arrays import Seed
+from terrainkit.curriculum.arrays import Array, Seed
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.geometry.free_space import Direction, clearance, first_surface, free_intervals
 from terrainkit.geometry.grid import Grid
@@ -285,9 +285,9 @@ class TerrainMap:
         return edit_map(self, heights, solids)
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Assign patches to `num_envs` environments; see `terrainkit.curriculum`.
+        """Assign patches to `num_envs` environments, distributed over the spawn positions.
 
-        The environments of a patch are distributed over its spawn positions.
+        For levels that change during training, a sampler of `terrainkit.curriculum` is recommended.
 
         Warns:
             TerrainkitWarning: if patches have several spawn positions, but too few for their
@@ -311,12 +311,14 @@ class TerrainMap:
             headings=spawns[:, 3],
         )
 
-    def resample_columns(self, levels: Any, columns: Any, *, seed: Seed) -> Any:
+    def resample_columns(self, levels: ArrayLike, columns: Array, *, seed: Seed) -> Array:
         """Return other columns at a reset; see `terrainkit.curriculum.resample_columns`."""
         return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
-    def update_levels(self, levels: Any, progress: Any, *, seed: Seed, top_levels: int = 3) -> Any:
-        """Return the levels after an episode; see `terrainkit.update_levels`."""
+    def update_levels(
+        self, levels: Array, progress: ArrayLike, *, seed: Seed, top_levels: int = 3
+    ) -> Array:
+        """Return levels kept elsewhere after an episode; see `terrainkit.update_levels`."""
         rows = len(self.difficulty)
         return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
 

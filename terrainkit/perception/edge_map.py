@@ -1,11 +1,10 @@
 """EdgeMap: the distance to the nearest edge of a step, and where a foot can stand."""
 
 import math
-from typing import Any
 
 import numpy as np
 
-from terrainkit.curriculum.arrays import like
+from terrainkit.curriculum.arrays import Array, like
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solid_raster import PIXEL
 from terrainkit.map.terrain_map import TerrainMap
@@ -69,7 +68,7 @@ class EdgeMap:
         self.distances = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         self.distances *= np.float32(self._spacing)
 
-    def distance(self, xy: Any) -> Any:
+    def distance(self, xy: Array) -> Array:
         """Return the horizontal distance to the nearest edge [m], inf on a map without edges.
 
         Args:
@@ -95,7 +94,7 @@ class EdgeMap:
         )
         return like((first * (1 - u) + second * u).astype(np.float32), xy)
 
-    def is_foothold(self, xy: Any, radius: float = 0.03) -> Any:
+    def is_foothold(self, xy: Array, radius: float = 0.03) -> Array:
         """Return where a foot is on one surface: no edge is within its radius.
 
         Args:
@@ -108,4 +107,5 @@ class EdgeMap:
         Raises:
             ConfigError: if the shape is wrong, a value is not finite, or the radius is negative.
         """
-        return self.distance(xy) >= to_number("radius", radius, 0.0)
+        is_clear: Array = self.distance(xy) >= to_number("radius", radius, 0.0)
+        return is_clear

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import like, to_numpy
+from terrainkit.curriculum.arrays import Array, like, to_numpy
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.ground_surface import HeightfieldSurface, WallTable
 from terrainkit.geometry.solid_raster import SolidRaster
@@ -133,7 +133,7 @@ class HeightScan:
         points = np.stack([coordinate.ravel() for coordinate in np.meshgrid(*axes, indexing="ij")])
         self.offsets = points.astype(np.float32)
 
-    def points(self, position: Any, yaw: Any) -> tuple[Any, Any, Any]:
+    def points(self, position: Array, yaw: ArrayLike) -> tuple[Array, Array, Array]:
         """Return x, y and z of the points on the surface [m], shape (n, k) each; see `below`.
 
         Args:
@@ -148,7 +148,7 @@ class HeightScan:
         x, y, z = like(result, position)
         return x, y, z
 
-    def below(self, position: Any, yaw: Any) -> Any:
+    def below(self, position: Array, yaw: ArrayLike) -> Array:
         """Return the z of the surface below each robot's height, at each point [m], shape (n, k).
 
         A solid whose bottom is above the robot is passed under. The ground, and a solid that begins
@@ -163,7 +163,7 @@ class HeightScan:
         """
         return self.points(position, yaw)[2]
 
-    def above(self, position: Any, yaw: Any) -> Any:
+    def above(self, position: Array, yaw: ArrayLike) -> Array:
         """Return the z of the lowest solid that begins above each robot's height [m], shape (n, k).
 
         Args:
@@ -183,7 +183,9 @@ class HeightScan:
             result[rows] = solids.ceiling(x, y, z)
         return like(result, position)
 
-    def blocks(self, position: Any, yaw: Any) -> Iterator[tuple[slice, Floats, Floats, Floats]]:
+    def blocks(
+        self, position: ArrayLike, yaw: ArrayLike
+    ) -> Iterator[tuple[slice, Floats, Floats, Floats]]:
         """Yield the points of blocks of robots: their rows, x and y (b, k), and z (b, 1) [m]."""
         given = to_floats("position", position, [None, 3]).astype(np.float32, copy=False)
         angles = to_floats("yaw", yaw, [len(given)]).astype(np.float32, copy=False)

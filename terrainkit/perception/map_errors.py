@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import like, make_rng, to_indices
+from terrainkit.curriculum.arrays import Array, like, make_rng, to_indices
 from terrainkit.errors import ConfigError
 from terrainkit.perception.height_scan import Floats, HeightScan, to_floats, to_number
 from terrainkit.perception.ray_caster import RayCaster
@@ -104,7 +104,7 @@ class MapErrors:
         self._past = np.empty((options.delay[1] + 1, n, k), np.float32)
         self.reset(np.arange(n))
 
-    def reset(self, env_ids: Any) -> None:
+    def reset(self, env_ids: ArrayLike) -> None:
         """Begin new episodes of some robots: no drift, no past scans, another delay.
 
         Args:
@@ -118,7 +118,7 @@ class MapErrors:
         delays = make_rng((self._seed, self._steps, 1)).integers(low, high + 1, len(self._age))
         self._delay[ids], self._age[ids], self._drift[ids] = delays[ids], 0, 0.0
 
-    def below(self, position: Any, yaw: Any) -> Any:
+    def below(self, position: Array, yaw: ArrayLike) -> Array:
         """Return the heights that robots measure, once per step; see `HeightScan.below`.
 
         Args:

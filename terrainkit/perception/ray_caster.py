@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.curriculum.arrays import like
+from terrainkit.curriculum.arrays import Array, like
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.solids import rotation_matrices
 from terrainkit.map.terrain_map import TerrainMap
@@ -41,7 +41,7 @@ class RayCaster:
         """
         self._scene = RayScene(terrain_map)
 
-    def cast(self, origins: Any, directions: Any, max_distance: float = 10.0) -> Any:
+    def cast(self, origins: Array, directions: ArrayLike, max_distance: float = 10.0) -> Array:
         """Return the distance along each ray to the first surface [m], inf where there is none.
 
         Args:
@@ -65,7 +65,9 @@ class RayCaster:
             result[rows] = self._scene.first_hits(starts[rows], toward, float(max_distance))[:, 0]
         return like(result, origins)
 
-    def sense(self, position: Any, quat: Any, directions: Any, max_distance: float = 10.0) -> Any:
+    def sense(
+        self, position: Array, quat: ArrayLike, directions: ArrayLike, max_distance: float = 10.0
+    ) -> Array:
         """Return what sensors of the same kind measure at n poses.
 
         Args:
@@ -85,7 +87,7 @@ class RayCaster:
         """
         starts = to_floats("position", position, [None, 3]).astype(np.float64)
         turns = rotation_matrices(_units(to_floats("quat", quat, [len(starts), 4])))
-        shape = np.shape(directions)[:-1]
+        shape: tuple[int, ...] = np.shape(directions)[:-1]
         given = to_floats("directions", directions, [*shape, 3], _MAX_LENGTH)
         pattern = _units(given.reshape(-1, 3))
         to_number("max_distance", max_distance, 1e-6)

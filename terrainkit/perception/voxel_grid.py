@@ -1,11 +1,11 @@
 """VoxelGrid: which voxels around each robot are occupied."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from terrainkit.curriculum.arrays import like
+from terrainkit.curriculum.arrays import Array, like
 from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.perception.height_scan import HeightScan, exact_surface, to_floats, to_number
@@ -44,7 +44,7 @@ class VoxelGrid:
         self._shape = len(x), len(y), len(z)
         self._half = np.float32(to_number("side", side, 1e-3, 100.0) / 2)
 
-    def occupied(self, position: Any, yaw: Any) -> Any:
+    def occupied(self, position: Array, yaw: ArrayLike) -> Array:
         """Return which voxels are occupied, shape (n, len(x), len(y), len(z)).
 
         Args:

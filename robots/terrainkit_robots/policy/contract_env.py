@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import listing
+from terrainkit.perception.orientation import projected_gravity
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit_robots.policy.contracts.contract import (
     DEFAULT_STEP_DT,
@@ -24,7 +25,7 @@ from terrainkit_robots.rl.observations import ObservationTerm, ObsTerms, PolicyI
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot_arrays import Robot
-from terrainkit_robots.transforms import FloatArray, projected_gravity
+from terrainkit_robots.transforms import FloatArray
 
 _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}
 """Terms that are another order or offset of a term of the environment."""

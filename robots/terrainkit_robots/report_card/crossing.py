@@ -11,6 +11,7 @@ from terrainkit import TerrainMap
 from terrainkit.curriculum.waypoints import Waypoints, route_lengths
 from terrainkit.errors import ConfigError
 from terrainkit.map.patch import Patch
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.policy_rollout import rollout
@@ -18,7 +19,6 @@ from terrainkit_robots.report_card.route import GOAL_RADIUS, HEADING_STIFFNESS, 
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import MapGround
-from terrainkit_robots.transforms import quat_to_yaw
 
 OUTCOMES = ("crossed", "fell", "left", "timed out")
 """Outcomes of an attempt: it crossed the patch, fell, left the patch, or took too long."""

@@ -8,13 +8,14 @@ import torch
 from numpy.typing import NDArray
 
 from terrainkit.curriculum import SAMPLERS, CommandProgress, assign_spawns
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit.views.curriculum_picture import draw_statistics
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.transforms import BoolArray, quat_to_yaw
+from terrainkit_robots.transforms import BoolArray
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv

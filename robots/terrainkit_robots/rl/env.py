@@ -12,6 +12,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import TerrainkitError, is_built_in, plugin_errors
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.actions import JointActions, checked_actions
 from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand, make_waypoints
@@ -28,7 +29,7 @@ from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import TERMINATIONS
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot_arrays import Robot
-from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
+from terrainkit_robots.transforms import BoolArray, FloatArray
 
 
 def make_env(

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.perception.height_scan import HeightScan
-from terrainkit_robots import transforms
+from terrainkit.perception.orientation import projected_gravity, quat_to_yaw
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.transforms import FloatArray
+from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
 
 CONTACT_FORCE = 1.0
 """Vertical force from which a foot is in contact [N], as in legged_gym."""
@@ -105,7 +105,7 @@ class Sensors:
             pos: Positions of the base [m], shape (n, 3).
             quat: Orientations of the base (w, x, y, z), shape (n, 4).
         """
-        return self._scan.points(pos, transforms.quat_to_yaw(quat))
+        return self._scan.points(pos, quat_to_yaw(quat))
 
     def read(self, rows: Any, last: State | None, commands: FloatArray) -> dict[str, Any]:
         """Return the measured fields of `State`.
@@ -118,7 +118,7 @@ class Sensors:
         sim, scene, dt = self._sim, self._sim.scene, self._dt
         qpos, qvel = sim.qpos[rows].astype(np.float32), sim.qvel[rows].astype(np.float32)
         quat, pos = qpos[:, 3:7], qpos[:, :3]
-        lin_vel, ang_vel = transforms.quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
+        lin_vel, ang_vel = quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
         dof_vel, foot_pos = qvel.take(scene.joint_qvel, 1), sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)
@@ -143,7 +143,7 @@ class Sensors:
             "base_lin_vel": lin_vel,
             "base_ang_vel": ang_vel,
             "mean_vel": last_vel + self._mean_weight * (vel - last_vel),
-            "projected_gravity": transforms.projected_gravity(quat),
+            "projected_gravity": projected_gravity(quat),
             "base_height": pos[:, 2] - self._terrain.height(*pos.T),
             "dof_pos": qpos[:, scene.joint_qpos],
             "dof_vel": dof_vel,
@@ -176,7 +176,7 @@ class Sensors:
         if self._terrain.is_plane:
             flat = np.zeros((*foot_pos.shape[:2], 5), np.float32)
             return flat, flat[..., 0]
-        yaw = transforms.quat_to_yaw(quat)
+        yaw = quat_to_yaw(quat)
         cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
         ahead = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)
         ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-6)

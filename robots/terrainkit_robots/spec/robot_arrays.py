@@ -82,20 +82,17 @@ class Robot:
                 "terrainkit onboard measures both"
             )
 
-        def array(table: str) -> FloatArray:
-            return np.array(list(spec.per_joint(table).values()), np.float32)
-
         soft = match_joints(spec.soft_limits, spec.joint_order).values
         limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
         lower, upper = np.array(limits, np.float32).T
         return cls(
             spec=spec,
             mjcf=folder / spec.mjcf,
-            default_pose=array("default_pose"),
-            wheels=(array("stiffness") == 0) & (array("damping") > 0),
-            action_scale=array("action_scale"),
-            effort=array("effort"),
-            velocity=array("velocity"),
+            default_pose=spec.joint_array("default_pose"),
+            wheels=(spec.joint_array("stiffness") == 0) & (spec.joint_array("damping") > 0),
+            action_scale=spec.joint_array("action_scale"),
+            effort=spec.joint_array("effort"),
+            velocity=spec.joint_array("velocity"),
             lower=lower,
             upper=upper,
         )

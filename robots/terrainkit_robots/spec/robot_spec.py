@@ -11,7 +11,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
+import numpy as np
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.settings.field_docs import field_docs
@@ -217,6 +219,10 @@ class RobotSpec(Config):
         if name not in JOINT_TABLES:
             raise ConfigError(f"no table by joint {name!r}; there are: {listing(JOINT_TABLES)}")
         return by_joint(getattr(self, name), self.joint_order, name)
+
+    def joint_array(self, name: str) -> NDArray[np.float32]:
+        """Return `per_joint` as an array in the order of `joint_order`, shape (j,)."""
+        return np.array(list(self.per_joint(name).values()), np.float32)
 
     def mirror_joints(self) -> list[MirrorJoint]:
         """Return the mirror image of each joint, in the order of `joint_order`.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.policy.evaluate import EvaluationConfig
@@ -13,7 +14,7 @@ from terrainkit_robots.policy.load_policy import load_policy, single_torch_threa
 from terrainkit_robots.policy.play import demo_commands, make_play_env
 from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.run import PolicySpec
-from terrainkit_robots.transforms import FloatArray, quat_to_yaw, wrap_to_pi
+from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 from terrainkit_robots.viewer.ground_scene import look_at, show_ground
 from terrainkit_robots.viewer.robot_scene import RobotScene
 

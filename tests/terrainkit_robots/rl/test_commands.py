@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.rl.commands import Gait, VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, Env, Rewards
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.transforms import quat_to_yaw
 
 _ALL = Commands(min_norm=0.0, standing=0.0)
 

@@ -8,13 +8,13 @@ import torch
 
 from terrainkit import MapConfig, generate
 from terrainkit.errors import PluginError
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.rl.config import Control, DomainRand, InitState, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import EventTerm, apply_params, reset_push, sample_params
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround, Plane
-from terrainkit_robots.transforms import quat_to_yaw
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit.perception.orientation import projected_gravity
 from terrainkit_robots.rl.config import Env, Task, Termination
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
@@ -12,7 +13,6 @@ from terrainkit_robots.rl.terminations import (
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.transforms import projected_gravity
 
 
 class Field(Plane):

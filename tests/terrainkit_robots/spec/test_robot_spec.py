@@ -37,8 +37,9 @@ def test_values_are_converted(spec):
 
 
 def test_per_joint_keeps_the_joint_order(spec):
-    made = spec(joint_order=("b", "a"), stiffness={"[ab]": 7})
-    assert list(made.per_joint("stiffness").items()) == [("b", 7.0), ("a", 7.0)]
+    made = spec(joint_order=("b", "a"), stiffness={"a": 6, "b": 7})
+    assert list(made.per_joint("stiffness").items()) == [("b", 7.0), ("a", 6.0)]
+    assert made.joint_array("stiffness").tolist() == [7.0, 6.0]
     with pytest.raises(ConfigError, match="no table by joint 'soft_limits'; there are: default_"):
         made.per_joint("soft_limits")
     with pytest.raises(ConfigError, match="joint b is matched by no key of damping"):

@@ -5,9 +5,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from terrainkit.perception.orientation import quat_to_yaw
 from terrainkit_robots.policy.play import demo_commands
 from terrainkit_robots.rl.run import open_run
-from terrainkit_robots.transforms import quat_to_yaw
 from terrainkit_robots.viewer.ground_scene import DEMO_MAP
 from terrainkit_robots.viewer.show_policy import PolicyView
 from tests.viewer_client import CAMERA, connect_to, send, update, wait_for

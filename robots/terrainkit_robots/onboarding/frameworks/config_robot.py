@@ -39,6 +39,9 @@ class ConfigRobot:
     passive_joints: Sequence[str] = ()
     """Movable joints of the URDF without an actuator, such as mimic joints."""
 
+    sites: Sequence[str] = ()
+    """Names of the sites in robot.xml."""
+
     roles: Mapping[str, str] = field(default_factory=dict)
     """Role of each joint of the legs, such as hip, knee or ankle."""
 

@@ -107,9 +107,12 @@ def robot_config_files(name: str, facts: "Facts", spec: RobotSpec) -> dict[str, 
         TerrainkitError: as `config_files`.
     """
     joints = facts.model.joints
+    bodies = [body_name(body) for body in facts.bodies]
+    links = [link.name for body in facts.bodies for link in body.links]
     robot = ConfigRobot(
         spec=spec,
-        bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
+        bodies=(*bodies, *spec.feet),
+        sites=("imu", *spec.feet, *(link for link in links if link not in bodies)),
         limits={joint.name: joint.range for joint in joints if joint.range is not None},
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
         roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},

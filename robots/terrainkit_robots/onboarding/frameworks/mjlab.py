@@ -126,6 +126,9 @@ def _articulation(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
         ]
         groups.setdefault((_VELOCITY if is_wheel else _POSITION, *arguments), []).append(joint)
     actuators = []
+    # mjlab warns where the pattern of a joint also matches a site.
+    sites = [site.rsplit("/", maxsplit=1)[-1] for site in robot.sites]
+    patterns = {**dict(zip(sites, sites, strict=True)), **patterns}
     for (kind, *arguments), joints in groups.items():
         names = source.format_strings(merge_names(joints, patterns))
         expression = source.format_collection(

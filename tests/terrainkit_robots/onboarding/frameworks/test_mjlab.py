@@ -148,7 +148,11 @@ def test_mjlab_names_are_in_robot_xml(onboarded, load, modules, format_name):
     result = onboarded(path)
     with quiet_mujoco():
         model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
-    loaded = load("mjlab", result.robot.spec, modules)
+    sites = [model.site(index).name for index in range(model.nsite)]
+    loaded = load("mjlab", result.robot.spec, modules, sites=sites)
+    for actuator in loaded.ARTICULATION.actuators:
+        for pattern in actuator.target_names_expr:
+            assert not any(re.fullmatch(pattern, site) for site in sites)
     body = [model.body(index).name for index in range(model.nbody)]
     geoms = [model.geom(index).name for index in range(model.ngeom)]
     sensors = [model.sensor(index).name for index in range(model.nsensor)]
@@ -197,6 +201,7 @@ def test_mjlab_config_with_only_wheels(load, modules, robots):
 @pytest.mark.parametrize("more", ["", '<actuatorfrc actuator="FL_calf"/>'])
 def test_mjlab_get_spec_removes_actuators(load, modules, robots, tmp_path, bundled_xml, more):
     text = bundled_xml.read_text().replace("</sensor>", more + "</sensor>")
+    text = text.replace("<worldbody>", '<option timestep="0.004"/><worldbody>')
     (tmp_path / "robot.xml").write_text(text)
     loaded = load("mjlab", robots.quadruped(), modules)
     with quiet_mujoco():
@@ -204,6 +209,7 @@ def test_mjlab_get_spec_removes_actuators(load, modules, robots, tmp_path, bundl
         made = loaded.get_spec().compile()
     assert (before.nu, before.nkey) == (12, 1)
     assert (made.nu, made.nkey) == (0, 0)
+    assert (before.opt.timestep, made.opt.timestep) == (0.004, 0.002)
     assert made.nsensor == before.nsensor - bool(more)
 
 
@@ -258,3 +264,5 @@ def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
     assert done.returncode == 0, done.stderr
     assert "Learning iteration 1/2" in done.stdout
     assert ("terrain_progress" in done.stdout) == is_map
+    assert "site(s)" not in done.stderr
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
