@@ -21,7 +21,6 @@ from types import ModuleType
 from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.robot_file import robot_names
 from terrainkit_robots.rl.config import Observations, Task
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -134,6 +133,8 @@ def get_task(name_or_folder: str | Path) -> RegisteredTask:
                 raise ConfigError(f"expected a call of register_task({name!r}, ...)")
         return _registered[name]
     if not isdir(name):  # noqa: PTH112 - Path.is_dir raises OSError for long names
+        from terrainkit_robots.description.robot_file import robot_names
+
         expected = expected_names(name, task_names(), "tasks are")
         if folder.suffix.lower() == ".npz":
             expected = f"a map is a terrain: `terrain={name}`; {expected}"
