@@ -173,7 +173,7 @@ def test_leggedgym_ex_files_are_a_package(robots):
 class Walker:
     """The environment of LeggedGym-Ex with two robots that stand at a height of 0.4 m."""
 
-    num_privileged_obs, add_noise = 235, True
+    num_privileged_obs, add_noise, device = 235, True, "cpu"
 
     def __init__(self, cfg):
         self.cfg = cfg
@@ -187,9 +187,18 @@ class Walker:
             **{name: torch.full((2, 3), 0.4) for name in triples},
             **{name: torch.zeros(2, 12) for name in joints},
             measured_heights=torch.full((2, 187), -0.3),
+            _robot=SimpleNamespace(set_dofs_armature=self.set_armature),
+            _dof_indices=range(6, 18),
         )
+        self._init_buffers()
+
+    def set_armature(self, values, joints):
+        self.armature = dict(zip(joints, values.tolist(), strict=True))
 
     def _parse_cfg(self, cfg):
+        """Do nothing."""
+
+    def _init_buffers(self):
         """Do nothing."""
 
 
@@ -215,6 +224,7 @@ def test_leggedgym_ex_trains_on_a_map(load, frameworks, robots, monkeypatch):
     exec(config_files("leggedgym_ex", robot)["quad_4.py"], vars(loaded))
     env = loaded.Quad4(config)
     assert sys.modules["legged_gym.simulator.genesis_simulator"].Terrain is terrain
+    assert list(env.armature.values()) == pytest.approx(config.asset.dof_armature)
     env.compute_observations()
     assert env.obs_buf.shape == (2, 232)
     # (0.4 - 0.5 + 0.3) * 5 for each height; then the velocity of the base.
