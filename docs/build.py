@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from io import StringIO
+from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,6 +26,7 @@ import cv2
 import numpy as np
 import yaml
 from config_schema import config_schema
+from diagrams import DRAWINGS
 from gallery import render_map, render_patches
 from numpy.typing import NDArray
 from rich.console import Console
@@ -53,6 +55,7 @@ from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rendering.robot_images import render_robot
 from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.legged_gym_names import Name, names, place_of
 from terrainkit_robots.simulation.robot_limits import derive_limits
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -288,7 +291,8 @@ def config_page() -> str:
         "Editors that know Taplo complete the keys from a JSON schema, which the first line of the",
         "file names: `#:schema PATH/docs/schemas/task.json`, or [map.json](schemas/map.json),",
         "[robot.json](schemas/robot.json), [task.json](schemas/task.json).",
-        "[Names of legged_gym](legged_gym_names.md) compares the settings of a training.\n",
+        "[Names of legged_gym](legged_gym_names.md) compares the settings of a training, and",
+        "`terrainkit import-config` translates a configuration of legged_gym.\n",
     ]
     for title, config in CONFIGS.items():
         parts += [f"## {title}\n", f"{inspect.getdoc(config).splitlines()[0]}\n"]
@@ -309,6 +313,29 @@ def config_rows(config: type[Config], prefix: str = "") -> Iterator[str]:
             default = f"`{value_text(NONE if field.default is None else field.default, 1000)}`"
         about = f"{describe(annotations[name])} | {default} | {docs.get(name, '')}"
         yield f"| `{prefix}{key}` | {about.replace('>=', '≥').replace('<=', '≤')} |"
+
+
+def names_page() -> str:
+    """Return the page with the table of names anew; its other text is written by hand."""
+    header = "| legged_gym, LeggedGym-Ex | here | |\n|---|---|---|\n"
+    before, _, rest = written("legged_gym_names.md").partition(header)
+    rows = []
+    # Settings in a row that are missing here for the same reason share a row.
+    for reason, group in groupby(names().items(), lambda item: item[1].no):
+        if reason:
+            keys = ", ".join(f"`{key}`" for key, _ in group)
+            rows.append(f"| {keys} | none | {reason} |\n")
+        else:
+            rows += (f"| `{key}` | {here_text(row)} | {row.about} |\n" for key, row in group)
+    return "".join([before, header, *rows, rest[rest.find("\n\n") + 1 :]])
+
+
+def here_text(row: Name) -> str:
+    if row.off is not None:
+        return f"`{place_of(row)}`; {value_text(row.off)} is off"
+    name, *where = place_of(row).split(" ", 1)
+    values = (f"{value_text(ours)} for {theirs}" for theirs, ours in row.values.items())
+    return " ".join([f"`{name}`", *where]) + ("; " if row.values else "") + ", ".join(values)
 
 
 def cli_page() -> str:
@@ -409,6 +436,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
         "walk": draw_walk,
+        **{name: partial(draw, PICTURES / f"{name}.svg") for name, draw in DRAWINGS.items()},
     }
 
 
@@ -588,6 +616,7 @@ def main() -> int:
         "papers.md": papers_page(),
         "rules.md": rules_page(),
         "config.md": config_page(),
+        "legged_gym_names.md": names_page(),
         "cli.md": cli_page(),
         "examples.md": examples_page(),
         "llms.txt": llms_text(),

@@ -89,6 +89,12 @@ def test_readme_is_short_and_has_two_setup_commands():
     assert len(text.splitlines()) <= 150
 
 
+def test_handwritten_pages_are_short():
+    texts = [path.read_text() for path in DOCS.glob("*.md")]
+    words = [len(text.split()) for text in texts if "<!-- Written by docs/" not in text]
+    assert sum(words) <= 33_000
+
+
 def test_index_lists_all_pages():
     """The pages of packages of the API are listed on api.md."""
     pages = {path.name for path in DOCS.glob("*.md") if not path.name.startswith("api_")}

@@ -49,7 +49,7 @@ class Reason(Enum):
 EXEMPT = {
     ("field_robots.md", "git clone"): Reason.DOWNLOADS,
     ("isaaclab.md", "pip install isaaclab"): Reason.INSTALLS,
-    ("integrations.md", "pip install mjlab"): Reason.INSTALLS,
+    ("mjlab.md", "pip install mjlab"): Reason.INSTALLS,
 }
 """The blocks that run nowhere, by page and a text in them."""
 
@@ -67,7 +67,10 @@ FRAMEWORK_BLOCKS = [
 ]
 """The blocks that run in the tests of a framework, by page and a text in them."""
 
-FRAMEWORK_PAGES = ("integrations.md", "isaaclab.md", "onboarding.md")
+FRAMEWORK_PAGES = (
+    *("isaaclab.md", "legged_gym.md", "leggedgym_ex.md", "mjlab.md", "mujoco.md", "newton.md"),
+    *("genesis.md", "pybullet.md", "playground.md", "gymnasium.md", "onboarding.md"),
+)
 
 REPLACED = read_table(__file__, "replaced")
 """What is typed in place of parts of the pages: patterns and their replacements."""

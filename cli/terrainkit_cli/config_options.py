@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.settings.schema import Config
+from terrainkit.settings.schema import Config, nested_table
 from terrainkit_cli.parse import Command, Option, options_of, read_args, split_args
 
 
@@ -58,7 +58,7 @@ class ConfigCommand(Command):
         own = options_of(cls)
         values = read_args([*own, *options_of(defaults, cls.ALIASES)], argv)
         arguments = {option.key: values.pop(option.key) for option in own if option.key in values}
-        return cls(defaults=defaults, changes=_nested(values), **arguments)
+        return cls(defaults=defaults, changes=nested_table(values), **arguments)
 
     def changed_config(self) -> Any:
         """Return the config with the values on the command line.
@@ -78,15 +78,3 @@ class ConfigCommand(Command):
         options = [*options_of(cls), *options_of(cls.default_config(), cls.ALIASES)]
         given, rest = split_args(options, argv)
         return {key: values[-1] for key, values in given.items() if values}, rest
-
-
-def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values with keys such as "env.num_envs" as nested mappings."""
-    nested: dict[str, Any] = {}
-    for key, value in values.items():
-        *sections, name = key.split(".")
-        table = nested
-        for section in sections:
-            table = table.setdefault(section, {})
-        table[name] = value
-    return nested

@@ -55,7 +55,10 @@ _MODULES = {
 }
 """Modules of the commands that have no module of their own."""
 
-COMMANDS = [name for group in COMMAND_GROUPS.values() for name in group] + ["completion"]
+_UNLISTED = ["import-config", "completion"]
+"""Commands without a line in the overview, which has no more lines than a terminal."""
+
+COMMANDS = [name for group in COMMAND_GROUPS.values() for name in group] + _UNLISTED
 
 _OUT_OF_MEMORY = re.compile("allocate memory|start new thread|failed to map segment")
 """Errors of torch, of threads and of shared libraries under a small limit of the memory."""
@@ -191,7 +194,7 @@ def _package_errors() -> Iterator[None]:
 
 def _print_overview() -> None:
     # The text fits into 24 lines, the size of a terminal.
-    render.result("usage: terrainkit COMMAND [OPTIONS | --help]; see also --version, completion.")
+    render.result(f"usage: terrainkit COMMAND [--help]; also --version, {', '.join(_UNLISTED)}.")
     rows: list[tuple[str, str]] = []
     for group, summaries in COMMAND_GROUPS.items():
         rows += [(f"{group}:", "")] if group else []

@@ -49,6 +49,9 @@ class SmokeTest(Command):
     """Samples of the short training; 0 for none. With fewer than 50,000, only its losses are
     checked."""
 
+    seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
+    """Seed of the random numbers of the short training."""
+
     format: Literal["text", "json"] = "text"
     """Format of the report. For several robots, json writes one document per line."""
 
@@ -118,7 +121,7 @@ class SmokeTest(Command):
 
         settings = parse_settings(self.ignore, self.package, self.xacro_arg)
         options = OnboardOptions(settings=settings, spec=self.spec)
-        return smoke_test(name, options, samples=self.samples, progress=progress)
+        return smoke_test(name, options, samples=self.samples, seed=self.seed, progress=progress)
 
 
 def show_progress(steps: render.Steps, step: str, fraction: float) -> None:

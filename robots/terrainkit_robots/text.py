@@ -68,6 +68,27 @@ def free_name(name: str, used_names: Container[str]) -> str:
     return free
 
 
+class UniqueNames:
+    """Give names of which no two are equal.
+
+    Args:
+        used_names: Names that are taken.
+    """
+
+    def __init__(self, used_names: Iterable[str] = ()) -> None:
+        self._used_names = set(used_names)
+        self._counts: dict[str, int] = {}
+
+    def add(self, name: str) -> str:
+        """Return `name`, or the first of name_2, name_3, ... that is not taken, and take it."""
+        free = name
+        while free in self._used_names:
+            self._counts[name] = self._counts.get(name, 1) + 1
+            free = f"{name}_{self._counts[name]}"
+        self._used_names.add(free)
+        return free
+
+
 def display_path(path: Path | str) -> str:
     """Return a path relative to the working directory if it is inside, otherwise unchanged."""
     try:

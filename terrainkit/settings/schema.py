@@ -177,6 +177,18 @@ def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield path + name, value
 
 
+def nested_table(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with keys such as "env.num_envs" as nested mappings."""
+    nested: dict[str, Any] = {}
+    for key, value in values.items():
+        *sections, name = key.split(".")
+        table = nested
+        for section in sections:
+            table = table.setdefault(section, {})
+        table[name] = value
+    return nested
+
+
 def nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
     """Return a value from TOML, with a Config for each table where one is expected."""
     kind, origin, args, _, is_optional = parse_hint(hint)

@@ -42,8 +42,12 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ConfigError("not a TOML file: nested too deeply") from None
 
 
-def read_text(path: "str | Path") -> str:
-    """Return the text of a TOML file.
+def read_text(path: "str | Path", kind: str = "TOML") -> str:
+    """Return the text of a file.
+
+    Args:
+        path: The file.
+        kind: What it is, in error messages.
 
     Raises:
         ConfigError: if it cannot be read, is not a regular file, or is larger than a megabyte.
@@ -55,9 +59,13 @@ def read_text(path: "str | Path") -> str:
             data = file.read(MAX_FILE_SIZE + 1)
     except (OSError, ValueError) as error:  # ValueError for a path with NUL
         reason = error.strerror if isinstance(error, OSError) else None
-        raise ConfigError(f"cannot read {path}: {reason or error}; expected a TOML file") from error
+        raise ConfigError(
+            f"cannot read {path}: {reason or error}; expected a {kind} file"
+        ) from error
     if len(data) > MAX_FILE_SIZE:
-        raise ConfigError(f"{path}: more than {MAX_FILE_SIZE} bytes; expected a smaller TOML file")
+        raise ConfigError(
+            f"{path}: more than {MAX_FILE_SIZE} bytes; expected a smaller {kind} file"
+        )
     try:
         return data.decode()
     except UnicodeDecodeError as error:

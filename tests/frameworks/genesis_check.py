@@ -1,4 +1,4 @@
-"""Run the block of docs/integrations.md in Genesis on the CPU; `make integrations` runs it."""
+"""Run the block of docs/genesis.md in Genesis on the CPU; `make integrations` runs it."""
 
 import os
 import sys
@@ -18,7 +18,7 @@ os.chdir(sys.argv[1])
 terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
-exec(page_block("integrations.md", "import genesis as gs"), names)
+exec(page_block("genesis.md", "import genesis as gs"), names)
 
 ball, terrain = names["ball"], names["terrain"]
 positions = ball.get_pos().cpu().numpy().astype(float)

@@ -70,7 +70,7 @@ print(f"Isaac Lab {version('isaaclab')}: levels move, origins on the ground; sim
 cfg = ROUGH_TERRAINS_CFG.replace(curriculum=True, num_rows=4, num_cols=6, border_width=2.0, seed=1)
 generator = TerrainGenerator(cfg)
 os.chdir(sys.argv[1])
-exec(page_block("integrations.md", "generator.terrain_mesh"), {"generator": generator, "cfg": cfg})
+exec(page_block("isaaclab.md", "generator.terrain_mesh"), {"generator": generator, "cfg": cfg})
 found = terrainkit.TerrainMap.load("isaaclab.npz")
 assert found.difficulty.shape == (4, 6)
 assert not (issues := validate(found)), issues

@@ -146,7 +146,7 @@ def environment(terrain, use_mujoco_contacts=False, use_curriculum=False):
     """Make the environment on a terrain."""
     cfg = env_cfg(terrain, use_mujoco_contacts)
     if use_curriculum:
-        exec(page_block("integrations.md", "use_terrain_curriculum(env"), {"env_cfg": cfg})
+        exec(page_block("isaaclab.md", "use_terrain_curriculum(env"), {"env_cfg": cfg})
     with launch_simulation(cfg=cfg, launcher_args=argparse.Namespace(device="cpu", headless=True)):
         env = ManagerBasedRLEnv(cfg)
         yield env
@@ -208,7 +208,7 @@ def make_map(*names, **options):
 ground = make_map("stairs", "pit", "slope", "rough")
 ground.save("map.npz")
 cfg = env_cfg(None, use_mujoco_contacts=False)
-exec(page_block("integrations.md", "env_cfg.scene.terrain"), {"env_cfg": cfg})
+exec(page_block("isaaclab.md", "max_init_terrain_level"), {"env_cfg": cfg})
 terrain = cfg.scene.terrain
 terrain.max_init_terrain_level = 1
 terrain.terrain_generator.num_rows = 5  # as in play mode

@@ -47,15 +47,15 @@ options = "--task=quad --headless --sim_device=cpu --rl_device=cpu --num_envs=8 
 run_command(f"python {example} {options}", checkout, *modules)
 print(f"{example.name}: 2 iterations")
 
-# The steps of docs/integrations.md; the page has the checkout in the folder legged_gym.
-steps = page_block("integrations.md", "cp terrain.py terrain.npz")
+# The steps of docs/legged_gym.md; the page has the checkout in the folder legged_gym.
+steps = page_block("legged_gym.md", "cp terrain.py terrain.npz")
 for step in steps.replace("legged_gym/", f"{checkout.name}/", 1).splitlines():
     if step.startswith("terrainkit "):
         terrainkit_command(*shlex.split(step, comments=True)[1:])
     else:
         subprocess.run(step, shell=True, cwd=FOLDER, check=True)
 with (envs / "__init__.py").open("a") as file:
-    file.write("\n" + page_block("integrations.md", "legged_robot.Terrain = "))
-train, _, _ = page_block("integrations.md", "train.py --task=a1").partition("  #")
+    file.write("\n" + page_block("legged_gym.md", "legged_robot.Terrain = "))
+train, _, _ = page_block("legged_gym.md", "train.py --task=a1").partition("  #")
 run_command(f"{train} {options.replace('--task=quad --headless', '')}", checkout, *modules)
-print("the steps of docs/integrations.md: 2 iterations of a1")
+print("the steps of docs/legged_gym.md: 2 iterations of a1")

@@ -60,4 +60,4 @@ assert torch.equal(critic[:, -3:], sim.base_lin_vel)
 runner, _ = task_registry.make_alg_runner(env, name, args)
 runner.learn(num_learning_iterations=2)
 np.savez(output, **arrays)
-exec(page_block("integrations.md", "genesis_simulator.Terrain = "))  # by hand, for other tasks
+exec(page_block("leggedgym_ex.md", "genesis_simulator.Terrain = "))  # by hand, for other tasks

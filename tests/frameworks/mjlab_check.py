@@ -33,7 +33,7 @@ terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz")
 
 names: dict = {}
-exec(page_block("integrations.md", "terrain_entity_cfg"), names)
+exec(page_block("mjlab.md", "terrain_entity_cfg"), names)
 cfg = names["cfg"]
 cfg.scene.num_envs, cfg.episode_length_s = 16, 0.4
 cfg.scene.terrain.max_init_terrain_level = 2
@@ -134,7 +134,7 @@ assert ratio <= 1.0, times
 print(f"make_spec: {times[0]:.3f} s, {ratio:.2f} of the time of mjlab's generator")
 
 # The reverse: a terrain of mjlab's generator as a map.
-exec(page_block("integrations.md", "import_terrain(ROUGH"), {})
+exec(page_block("mjlab.md", "import_terrain(ROUGH"), {})
 assert not (issues := validate(terrainkit.TerrainMap.load("mjlab.npz"))), issues
 cfg = replace(ROUGH_TERRAINS_CFG, seed=1, curriculum=True, num_rows=4, border_width=2.0)
 found = import_terrain(cfg).terrain_map

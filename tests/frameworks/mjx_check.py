@@ -20,7 +20,7 @@ ball.add_freejoint()
 ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0])
 add_map(spec, terrain_map)
 names = {"spec": spec}
-exec(page_block("integrations.md", "mjx.put_model"), names)
+exec(page_block("mujoco.md", "mjx.put_model"), names)
 model = names["mjx_model"]
 data = mjx.make_data(model)
 qpos = np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (16, 1))

@@ -1,4 +1,4 @@
-"""Run the block of docs/integrations.md in MuJoCo Playground with MJX on the CPU.
+"""Run the block of docs/playground.md in MuJoCo Playground with MJX on the CPU.
 
 `make integrations` runs it. Playground clones MuJoCo Menagerie for the meshes of the robot, which
 robots do not collide with; here the meshes of mjlab's wheel replace them.
@@ -33,7 +33,7 @@ terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
 start = time.process_time()
-exec(page_block("integrations.md", "import jax"), names)
+exec(page_block("playground.md", "import jax"), names)
 cpu = time.process_time() - start
 print(f"Playground {version('playground')}: compiled and ran 50 steps in {cpu:.0f} s of CPU time")
 

@@ -16,7 +16,7 @@ for preset in ("legged_gym", "parkour"):
     terrain_map = terrainkit.generate(config)
     terrain_map.save("map.npz", overwrite=True)
     names: dict = {}
-    exec(page_block("integrations.md", "import pybullet"), names)
+    exec(page_block("pybullet.md", "import pybullet"), names)
     client, body = names["client"], names["body"]
     pybullet.setGravity(0, 0, -9.81)
     assert pybullet.getDynamicsInfo(body, -1)[1] == config.static_friction

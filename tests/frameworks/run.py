@@ -25,7 +25,7 @@ PACKAGES = {
     "isaaclab3": [["isaaclab==3.0.0"]],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
-    "drake": [["drake==1.51.1"]],
+    "drake": [["drake==1.58.0"]],
     "sdformat": [],
     "sb3": [
         GYMNASIUM,
@@ -45,7 +45,7 @@ CHECKOUTS = {"leggedgym_ex": "LEGGEDGYM_EX", "legged_gym": "LEGGED_GYM"}
 """Variable with the folder of a framework that is no package. The check runs beside its
 environment, in which terrainkit is not installed."""
 
-PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12"}
+PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12", "drake": "3.12"}
 """Version of Python of an environment, where it is not the version that runs this program."""
 
 KEPT = ("mjlab", "isaaclab3")

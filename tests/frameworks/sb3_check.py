@@ -52,7 +52,7 @@ os.chdir(folder)
 terrain_map = terrainkit.generate(terrainkit.MapConfig(rows=4, cols=10, border=1.0))
 terrain_map.save("map.npz")
 names: dict = {}
-exec(page_block("integrations.md", "import PPO"), names)
+exec(page_block("gymnasium.md", "import PPO"), names)
 assert names["env"].env.env.terrain.terrain_map.grid == terrain_map.grid
 assert names["model"].num_timesteps == 64 * 24
 print("trained on a map")

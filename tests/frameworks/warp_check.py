@@ -26,7 +26,7 @@ model = spec.compile()
 with warp.ScopedDevice("cpu"):
     names = {"model": model}
     # A ball can touch the ground and a solid; a foot on a heightfield has up to 50 contacts.
-    block = page_block("integrations.md", "import mujoco_warp")
+    block = page_block("mujoco.md", "import mujoco_warp")
     exec(block.replace("nworld=4096", "nworld=16"), names)
     warp_model, data = names["warp_model"], names["data"]
     positions = np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (16, 1))
@@ -41,7 +41,7 @@ print(f"MuJoCo Warp {version('mujoco-warp')}: all balls within {error * 1e3:.1f}
 os.chdir(sys.argv[1])
 terrain_map.save("map.xml")
 with warp.ScopedDevice("cpu"):
-    exec(page_block("integrations.md", "import newton"), names)
+    exec(page_block("newton.md", "import newton"), names)
     builder = names["builder"]
     for start in starts:
         body = builder.add_body(xform=warp.transform(start.tolist(), warp.quat_identity()))

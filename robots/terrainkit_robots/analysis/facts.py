@@ -7,7 +7,6 @@ from functools import cached_property, wraps
 from typing import TYPE_CHECKING, TypeVar
 
 from terrainkit_robots.analysis.bodies.base_joints import (
-    below_base,
     find_base_joints,
     moves_freely,
     moves_in_plane,
@@ -16,6 +15,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physica
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
+from terrainkit_robots.analysis.bodies.world_base import with_free_base, with_world_base
 from terrainkit_robots.analysis.inertia.inertia_repair import InertiaRepair
 from terrainkit_robots.analysis.legs.closed_loops import BodyLoop, body_loops
 from terrainkit_robots.analysis.legs.default_pose import default_positions
@@ -82,8 +82,12 @@ class Facts:
         self.base_joints: tuple[Joint, ...] = base_joints
         """Ordinary joints that a floating base is written as; they are no joints of the robot."""
 
-        self.model: RobotModel = replace(model, floating=True) if base_joints else model
-        """The description."""
+        self.model: RobotModel = (
+            replace(model, floating=True)
+            if base_joints
+            else with_world_base(model, build_tree(model))
+        )
+        """The description; the world is its base link if several parts are attached to it."""
 
     def _find_base_joints(self, model: RobotModel) -> tuple[Joint, ...]:
         """Return the ordinary joints of a floating base, if the robot stands on legs or is free."""
@@ -99,6 +103,13 @@ class Facts:
         """Return the facts of a changed description, with the same base."""
         return Facts(model, self.meshes, spec=self.spec, base_joints=self.base_joints)
 
+    def with_free_base(self) -> "Facts":
+        """Return the facts of the robot without joints between the world and its first body."""
+        base = next((name for name in self.tree.order if not self.tree.links[name].virtual), None)
+        if base is None or base == self.tree.order[0]:
+            return self
+        return self.with_model(with_free_base(self.model, self.tree, base))
+
     @property
     def required_spec(self) -> "RobotSpec":
         """The robot.toml, for rules that only run with one."""
@@ -111,7 +122,10 @@ class Facts:
     def tree(self) -> Tree:
         """The tree of links, without the joints that do not fit into a tree."""
         tree = build_tree(self.model)
-        return below_base(tree, self.base_joints) if self.base_joints else tree
+        if not self.base_joints:
+            return tree
+        base = self.base_joints[-1].child
+        return build_tree(with_free_base(self.model, tree, base), base)
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

@@ -446,11 +446,10 @@ class Joint:
     def range(self) -> tuple[float, float] | None:
         """Return the lower and upper limit [rad] or [m]; None if the joint has no valid limits."""
         limit = self.limit
-        if self.kind == "continuous" or limit is None or None in (limit.lower, limit.upper):
+        lower, upper = (limit.lower, limit.upper) if limit else (None, None)
+        if self.kind == "continuous" or lower is None or upper is None:
             return None
-        assert limit.lower is not None
-        assert limit.upper is not None
-        return (limit.lower, limit.upper) if limit.lower < limit.upper else None
+        return (lower, upper) if lower < upper else None
 
     @property
     def direction(self) -> Matrix:
@@ -477,6 +476,12 @@ class Actuator:
 
     stiffness: float | None = None
     """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
+
+    damping: float = 0.0
+    """Derivative gain on the joint [N m s/rad] or [N s/m]; 0 if it is a damping ratio."""
+
+    armature: float = 0.0
+    """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
 
     commands: tuple[float, float] | None = None
     """Range of the commanded force of a motor; None if it is unlimited or commands something
@@ -564,7 +569,7 @@ class RobotModel:
     """Tendons; MJCF only."""
 
     left_out: tuple[str, ...] = ()
-    """Constraints, tendons and keyframes that the model does not have, one phrase each."""
+    """Parts of the file that the model does not have, such as keyframes, one phrase each."""
 
     problems: tuple[Problem, ...] = ()
     """What could not be read."""

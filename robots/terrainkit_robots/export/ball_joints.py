@@ -18,18 +18,8 @@ def with_hinges_for_balls(facts: Facts) -> Facts:
     links: list[Link] = []
     joints: list[Joint] = []
     base = {joint.child for joint in facts.base_joints}
-    balls = {
-        joint.child: joint
-        for joint in model.joints
-        if joint.kind == "ball" and joint.parent != WORLD and joint.child not in base
-    }
-    for link in model.links:
-        if link.name in balls:
-            source = balls[link.name].source
-            links += [Link(name=f"{link.name}:{a}", source=source, virtual=True) for a in "xy"]
-        links.append(link)
     for joint in model.joints:
-        if joint.child not in balls:
+        if joint.kind != "ball" or joint.parent == WORLD or joint.child in base:
             joints.append(joint)
             continue
         parent = joint.parent
@@ -45,7 +35,9 @@ def with_hinges_for_balls(facts: Facts) -> Facts:
                 axis=axis,
             )
             joints.append(hinge)
+            if child != joint.child:
+                links.append(Link(name=child, source=joint.source, virtual=True))
             parent = child
-    if not balls:
+    if not links:
         return facts
-    return facts.with_model(replace(model, links=tuple(links), joints=tuple(joints)))
+    return facts.with_model(replace(model, links=(*model.links, *links), joints=tuple(joints)))

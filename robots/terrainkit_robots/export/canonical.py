@@ -6,7 +6,6 @@ removed and listed in `changes`.
 """
 
 import re
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +27,6 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
-from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
 
@@ -60,10 +58,10 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: got no links; expected a robot")
     changes: list[str] = []
-    original, facts = facts, with_hinges_for_balls(facts)
-    if facts is not original:
+    hinged = with_hinges_for_balls(facts)
+    if hinged is not facts:
         changes.append("replaced each ball joint by three hinges")
-    facts = with_world_base(facts, floating=floating)
+    facts = hinged.with_free_base() if floating else hinged
     links = _links(facts, changes)
     joints = _joints(facts, changes)
     floating = has_floating_base(facts) if floating is None else floating
@@ -71,7 +69,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
     link_names = {link.name for link in links}
     if WORLD in link_names:
         new_name = free_name(f"{WORLD}_link", link_names)
-        if WORLD in original.body_of:
+        if not facts.tree.links[WORLD].virtual:
             changes.append(f"renamed link {WORLD} to {new_name}: MuJoCo reserves the name {WORLD}")
         else:
             attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
@@ -95,12 +93,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
         links=tuple(links),
         joints=tuple(joint for joint, _ in joints),
         actuators=tuple(
-            Actuator(
-                name=joint.name,
-                source=joint.source,
-                joint=joint.name,
-                effort=joint.limit.effort if joint.limit else None,
-            )
+            Actuator(name=joint.name, source=joint.source, joint=joint.name, effort=joint.effort)
             for joint, name_before in joints
             if joint.moves and name_before in actuated
         ),
@@ -168,9 +161,7 @@ def plain_name(model: RobotModel) -> str:
 
 
 def _links(facts: Facts, changes: list[str]) -> list[Link]:
-    index = {name: place for place, name in enumerate(facts.tree.order)}
-    links = [link for body in facts.bodies for link in body.links]
-    links.sort(key=lambda link: index[link.name])
+    links = [facts.tree.links[name] for name in facts.tree.order if name in facts.body_of]
     left = [name for name in facts.tree.links if name not in facts.body_of]
     if left:
         changes.append(f"removed {names(left)}: not part of the kinematic tree")
@@ -195,17 +186,14 @@ def has_unknown_inertia(inertial: Inertial | None) -> bool:
 
 def _joints(facts: Facts, changes: list[str]) -> list[tuple[Joint, str]]:
     """Return the joint of each link except the base, and its original name."""
-    index = {name: place for place, name in enumerate(facts.tree.order)}
     base = facts.bodies[0].top.name
     bodies = {body.top.name: body for body in facts.bodies}
-    inside = sorted((n for n in facts.body_of if n != base), key=lambda n: index[n])
-    parent_joints = [facts.tree.parent_joint[name] for name in inside]
-    name_counts = Counter(joint.name for joint in parent_joints)
+    inside = [name for name in facts.tree.order if name in facts.body_of and name != base]
     mimic_joint_names = {joint.name for joint in mimic_joints(facts.joints)}
     used_names, result = set[str](), []
-    for joint in parent_joints:
+    for joint in (facts.tree.parent_joint[name] for name in inside):
         name = joint.name or f"{joint.child}_joint"
-        if name_counts[joint.name] > 1 and name in used_names:
+        if name in used_names:
             name = free_name(f"{joint.child}_joint", used_names)
             changes.append(
                 f"renamed the joint of {joint.child} to {name}: duplicate name {joint.name}"

@@ -6,6 +6,7 @@ mass: all mass is in the `inertial` of each body.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.export.actuator import ActuatorConfig
-from terrainkit_robots.text import free_name
+from terrainkit_robots.text import UniqueNames, free_name
 from terrainkit_robots.transforms import Matrix, invert_poses, matrix_to_quat
 
 FLOOR = "floor"
@@ -91,10 +92,8 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     step = number_text(extras.time_step)
     etree.SubElement(root, "option", timestep=step, integrator="implicitfast")
     _defaults(root)
-    names = _assets(root, model)
-    world = etree.SubElement(root, "worldbody")
-    sites = [*_unique_sites(extras), *_constraint_sites(model)]
-    base = _bodies(world, model, names, extras, sites)
+    writer = _BodyWriter(root, model, extras)
+    base = writer.write(etree.SubElement(root, "worldbody"))
     at_zero = extras.height if extras.height_at_zero is None else extras.height_at_zero
     base.set("pos", number_text([0, 0, at_zero]))
     if model.floating:
@@ -106,6 +105,8 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     _actuators(root, model, extras)
     _sensors(root, extras)
     _keyframe(root, model, extras)
+    for empty in root.xpath("*[not(*|@*)]"):
+        root.remove(empty)
     etree.indent(root)
     text: str = etree.tostring(root, encoding="unicode")
     return text + "\n"
@@ -123,6 +124,26 @@ def floor_text() -> str:
     )
 
 
+_SCENE = f"""<mujoco model="%(name)s scene">
+  <include file="%(file)s"/>
+  <statistic center="0 0 %(middle)s" extent="%(extent)s"/>
+  <visual>
+    <headlight diffuse="0.6 0.6 0.6" ambient="0.3 0.3 0.3"/>
+  </visual>
+  <asset>
+    <texture name="grid" type="2d" builtin="checker" rgb1="0.86 0.88 0.9" rgb2="0.8 0.82 0.85" \
+width="300" height="300"/>
+    <material name="grid" texture="grid" texrepeat="2 2" texuniform="true"/>
+  </asset>
+  <worldbody>
+    <light pos="0 0 %(light)s" dir="0 0 -1" type="directional"/>
+    <geom name="{FLOOR}" type="plane" size="0 0 0.05" material="grid" contype="{_ALL_BITS}" \
+conaffinity="{_ALL_BITS}"/>
+  </worldbody>
+</mujoco>
+"""
+
+
 def scene_text(name: str, file: str, *, height: float) -> str:
     """Return an MJCF with a floor and a light that includes the robot.
 
@@ -131,45 +152,13 @@ def scene_text(name: str, file: str, *, height: float) -> str:
         file: MJCF of the robot in the same folder.
         height: Approximate height of the robot [m].
     """
-    root = etree.Element("mujoco", model=f"{name} scene")
-    etree.SubElement(root, "include", file=file)
-    etree.SubElement(
-        root, "statistic", center=number_text([0, 0, height / 2]), extent=number_text(2 * height)
-    )
-    visual = etree.SubElement(root, "visual")
-    etree.SubElement(visual, "headlight", diffuse="0.6 0.6 0.6", ambient="0.3 0.3 0.3")
-    asset = etree.SubElement(root, "asset")
-    etree.SubElement(
-        asset,
-        "texture",
-        name="grid",
-        type="2d",
-        builtin="checker",
-        rgb1="0.86 0.88 0.9",
-        rgb2="0.8 0.82 0.85",
-        width="300",
-        height="300",
-    )
-    etree.SubElement(
-        asset, "material", name="grid", texture="grid", texrepeat="2 2", texuniform="true"
-    )
-    world = etree.SubElement(root, "worldbody")
-    etree.SubElement(
-        world, "light", pos=number_text([0, 0, 4 * height]), dir="0 0 -1", type="directional"
-    )
-    etree.SubElement(
-        world,
-        "geom",
-        name=FLOOR,
-        type="plane",
-        size="0 0 0.05",
-        material="grid",
-        contype=_ALL_BITS,
-        conaffinity=_ALL_BITS,
-    )
-    etree.indent(root)
-    text: str = etree.tostring(root, encoding="unicode")
-    return text + "\n"
+    return _SCENE % {
+        "name": escape(name),
+        "file": escape(file),
+        "middle": number_text(height / 2),
+        "extent": number_text(2 * height),
+        "light": number_text(4 * height),
+    }
 
 
 def _unique_sites(extras: Extras) -> list[Site]:
@@ -196,18 +185,13 @@ _MeshKey = tuple[str, tuple[float, ...]]
 
 def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
     """Write the meshes, and return their names."""
-    collision = {_mesh_key(g) for link in model.links for g in link.collisions if g.shape == "mesh"}
-    visual = {_mesh_key(g) for link in model.links for g in link.visuals if g.shape == "mesh"}
-    if not (collision or visual):
-        return {}
+    shapes = [shape for link in model.links for shape in (*link.collisions, *link.visuals)]
     asset = etree.SubElement(root, "asset")
     names = dict[_MeshKey, str]()
-    used_names = set[str]()
-    for key in sorted(collision | visual):
-        file, scale = key
-        name = free_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], used_names)
-        used_names.add(name)
-        names[key] = name
+    unique = UniqueNames()
+    for file, scale in sorted({_mesh_key(shape) for shape in shapes if shape.shape == "mesh"}):
+        name = unique.add(file.rsplit("/", 1)[-1].rsplit(".", 1)[0])
+        names[file, scale] = name
         mesh = etree.SubElement(asset, "mesh", name=name, file=file)
         if scale != (1.0, 1.0, 1.0):
             mesh.set("scale", number_text(scale))
@@ -219,74 +203,60 @@ def _mesh_key(geometry: Geometry) -> _MeshKey:
     return geometry.mesh.filename, tuple(geometry.mesh.scale)
 
 
-def _bodies(
-    world: Any,
-    model: RobotModel,
-    meshes: Mapping[_MeshKey, str],
-    extras: Extras,
-    all_sites: Sequence[Site],
-) -> Any:
-    """Write all bodies, and return the element of the base."""
-    links = {link.name: link for link in model.links}
-    child_joints: dict[str, list[Joint]] = {name: [] for name in links}
-    for joint in model.joints:
-        child_joints[joint.parent].append(joint)
-    sites: dict[str, list[Site]] = {name: [] for name in links}
-    for site in all_sites:
-        sites[site.body].append(site)
-    # A stack instead of recursion: a chain of links may exceed Python's limit.
-    base = model.links[0]
-    stack: list[tuple[Any, list[Joint], Link]] = [(world, [], base)]
-    first = None
-    used_names = {FLOOR}
-    while stack:
-        parent, joints, link = stack.pop()
-        if link.virtual and len(child_joints[link.name]) == 1 and joints:
-            (joint,) = child_joints[link.name]
-            stack.append((parent, [*joints, joint], links[joint.child]))
-            continue
-        body = _body(parent, joints, link, meshes, extras, sites[link.name], used_names)
-        first = body if first is None else first
-        stack += [
-            (body, [joint], links[joint.child]) for joint in reversed(child_joints[link.name])
-        ]
-    return first
+class _BodyWriter:
+    """Write the bodies of a robot, with their joints, shapes and sites."""
 
+    def __init__(self, root: Any, model: RobotModel, extras: Extras) -> None:
+        self._meshes = _assets(root, model)
+        self._model, self._actuators = model, extras.actuators
+        self._names = UniqueNames([FLOOR])
+        self._child_joints: dict[str, list[Joint]] = {link.name: [] for link in model.links}
+        for joint in model.joints:
+            self._child_joints[joint.parent].append(joint)
+        self._sites: dict[str, list[Site]] = {link.name: [] for link in model.links}
+        for site in (*_unique_sites(extras), *_constraint_sites(model)):
+            self._sites[site.body].append(site)
 
-def _body(
-    parent: Any,
-    joints: Sequence[Joint],
-    link: Link,
-    meshes: Mapping[_MeshKey, str],
-    extras: Extras,
-    sites: Sequence[Site],
-    used_names: set[str],
-) -> Any:
-    body = etree.SubElement(parent, "body", name=link.name)
-    pose = np.eye(4)
-    for joint in joints:
-        pose = pose @ joint.origin
-    _place(body, pose)
-    if link.gravity_compensation:
-        body.set("gravcomp", number_text(link.gravity_compensation))
-    _inertial(body, link)
-    for index, joint in enumerate(joints):
-        if joint.moves:
-            # The axes of all joints are in the frame of the body at zero position.
-            after = np.eye(4)
-            for later in joints[index + 1 :]:
-                after = after @ later.origin
-            _joint(body, joint, invert_poses(after), extras.actuators.get(joint.name))
-    for shape in link.visuals:
-        _geom(body, shape, "visual", meshes)
-    for index, shape in enumerate(link.collisions, 1):
-        number = str(index) if len(link.collisions) > 1 else ""
-        name = free_name(f"{link.name}{COLLISION_SUFFIX}{number}", used_names)
-        used_names.add(name)
-        _geom(body, shape, "collision", meshes).set("name", name)
-    for site in sites:
-        _site(body, site)
-    return body
+    def write(self, world: Any) -> Any:
+        """Write all bodies, and return the element of the base."""
+        links = {link.name: link for link in self._model.links}
+        # A stack instead of recursion: a chain of links may exceed Python's limit.
+        stack: list[tuple[Any, list[Joint], Link]] = [(world, [], self._model.links[0])]
+        while stack:
+            parent, joints, link = stack.pop()
+            after = self._child_joints[link.name]
+            if link.virtual and len(after) == 1 and joints:
+                stack.append((parent, [*joints, *after], links[after[0].child]))
+                continue
+            body = self._body(parent, joints, link)
+            stack += [(body, [joint], links[joint.child]) for joint in reversed(after)]
+        return world[0]
+
+    def _body(self, parent: Any, joints: Sequence[Joint], link: Link) -> Any:
+        body = etree.SubElement(parent, "body", name=link.name)
+        pose = np.eye(4)
+        for joint in joints:
+            pose = pose @ joint.origin
+        _place(body, pose)
+        if link.gravity_compensation:
+            body.set("gravcomp", number_text(link.gravity_compensation))
+        _inertial(body, link)
+        for index, joint in enumerate(joints):
+            if joint.moves:
+                # The axes of all joints are in the frame of the body at zero position.
+                after = np.eye(4)
+                for later in joints[index + 1 :]:
+                    after = after @ later.origin
+                _joint(body, joint, invert_poses(after), self._actuators.get(joint.name))
+        for shape in link.visuals:
+            _geom(body, shape, "visual", self._meshes)
+        for index, shape in enumerate(link.collisions, 1):
+            number = str(index) if len(link.collisions) > 1 else ""
+            geom = _geom(body, shape, "collision", self._meshes)
+            geom.set("name", self._names.add(f"{link.name}{COLLISION_SUFFIX}{number}"))
+        for site in self._sites[link.name]:
+            _site(body, site)
+        return body
 
 
 def _place(element: Any, pose: Matrix) -> None:
@@ -328,19 +298,18 @@ def _joint(body: Any, joint: Joint, frame: Matrix, actuator: ActuatorConfig | No
     if np.abs(anchor).max() > 0:
         element.set("pos", number_text(anchor))
     element.set("axis", number_text(frame[:3, :3] @ joint.direction))
-    if joint.range is not None:
-        element.set("range", number_text(joint.range))
-    if joint.damping:
-        element.set("damping", number_text(joint.damping))
-    if joint.friction:
-        element.set("frictionloss", number_text(joint.friction))
-    armature = joint.armature if actuator is None else actuator.armature
-    if armature:
-        element.set("armature", number_text(armature))
-    if joint.stiffness:
-        element.set("stiffness", number_text(joint.stiffness))
-    if joint.spring_reference:  # also without a spring: tendons take their length from it
-        element.set("springref", number_text(joint.spring_reference))
+    numbers = {
+        "range": joint.range,
+        "damping": joint.damping,
+        "frictionloss": joint.friction,
+        "armature": joint.armature if actuator is None else actuator.armature,
+        "stiffness": joint.stiffness,
+        # also without a spring: tendons take their length from it
+        "springref": joint.spring_reference,
+    }
+    for name, value in numbers.items():
+        if value:
+            element.set(name, number_text(value))
     element.attrib.update(joint.settings)
 
 
@@ -372,11 +341,9 @@ def _site(body: Any, site: Site) -> None:
 
 
 def _contact(root: Any, extras: Extras) -> None:
-    pairs = sorted(tuple(sorted(pair)) for pair in extras.excluded)
-    if pairs:
-        contact = etree.SubElement(root, "contact")
-        for first, second in pairs:
-            etree.SubElement(contact, "exclude", body1=first, body2=second)
+    contact = etree.SubElement(root, "contact")
+    for first, second in sorted(tuple(sorted(pair)) for pair in extras.excluded):
+        etree.SubElement(contact, "exclude", body1=first, body2=second)
 
 
 def _constraint_sites(model: RobotModel) -> Iterator[Site]:
@@ -414,13 +381,9 @@ def _equality(root: Any, model: RobotModel) -> None:
         # Sites keep both ends; an anchor gives the second one at the zero position only.
         ends = {f"site{number}": f"{loop.name}_{number}" for number in (1, 2)}
         etree.SubElement(equality, loop.kind, name=loop.name, **ends, **loop.settings)
-    if not len(equality):
-        root.remove(equality)
 
 
 def _tendons(root: Any, model: RobotModel) -> None:
-    if not model.tendons:
-        return
     section = etree.SubElement(root, "tendon")
     for tendon in model.tendons:
         kind = "fixed" if tendon.joints else "spatial"
@@ -435,8 +398,6 @@ def _tendons(root: Any, model: RobotModel) -> None:
 
 
 def _actuators(root: Any, model: RobotModel, extras: Extras) -> None:
-    if not extras.actuators:
-        return
     joints = {joint.name: joint for joint in model.joints}
     section = etree.SubElement(root, "actuator")
     for name, actuator in extras.actuators.items():
@@ -466,15 +427,12 @@ _IMU = (
 
 
 def _sensors(root: Any, extras: Extras) -> None:
-    if extras.imu is None and not extras.feet:
-        return
     sensor = etree.SubElement(root, "sensor")
     if extras.imu is not None:
         for kind, name in _IMU:
-            element = etree.SubElement(sensor, kind, name=name)
-            if kind == "framequat":
-                element.set("objtype", "site")
-            element.set("objname" if kind == "framequat" else "site", extras.imu.name)
+            object_type = {"objtype": "site"} if kind == "framequat" else {}
+            target = "objname" if object_type else "site"
+            etree.SubElement(sensor, kind, name=name, **object_type, **{target: extras.imu.name})
     for foot in extras.feet:
         etree.SubElement(sensor, "touch", name=f"{foot.name}_contact", site=foot.name)
 

@@ -16,7 +16,7 @@ from lxml import etree
 from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link, RobotModel
 from terrainkit_robots.description.xml.number_text import number_text, place_text
 from terrainkit_robots.export.urdf_shapes import to_elements
-from terrainkit_robots.text import free_name
+from terrainkit_robots.text import UniqueNames
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy
 
 MIN_MASS = 1e-7
@@ -75,7 +75,7 @@ class _Writer:
         self._feet = frozenset(feet)
         names = {link.name for link in model.links}
         self._parent_joints = {j.child: j for j in model.joints if j.parent in names}
-        self._used_names = names | {joint.name for joint in model.joints}
+        self._names = UniqueNames(names | {joint.name for joint in model.joints})
         self._massless_links = frozenset(_massless_links(model, self._parent_joints))
         total = sum(map(_mass, model.links))
         self._min_mass = min(MIN_MASS, MAX_MASS_RATIO * total) if total > 0 else MIN_MASS
@@ -112,11 +112,6 @@ class _Writer:
         text = number_text(number)
         self._defaults.setdefault(f"Unknown {what}, set to {text}", []).append(joint.name)
         return text
-
-    def _unused_name(self, name: str) -> str:
-        free = free_name(name, self._used_names)
-        self._used_names.add(free)
-        return free
 
     def _link(self, root: Any, link: Link) -> None:
         element = etree.SubElement(root, "link", name=link.name)
@@ -156,10 +151,10 @@ class _Writer:
             return
         offset = np.eye(4)
         offset[:3, 3] = anchor
-        axis = self._unused_name(f"{joint.child}_axis")
+        axis = self._names.add(f"{joint.child}_axis")
         self._write_joint(root, joint, axis, joint.origin @ offset)
         self._write_min_inertial(etree.SubElement(root, "link", name=axis))
-        fixed = self._element(root, self._unused_name(f"{axis}_fixed"), "fixed", joint.child)
+        fixed = self._element(root, self._names.add(f"{axis}_fixed"), "fixed", joint.child)
         offset[:3, 3] = -anchor
         _origin(fixed, offset)
         _write_parent_and_child(fixed, axis, joint.child)

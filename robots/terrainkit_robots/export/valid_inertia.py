@@ -50,11 +50,7 @@ def with_valid_inertia(
     updated = {link.name: link for link in links}
     for body in bodies:
         poses = {link.name: pose for link, pose in zip(body.links, body.poses, strict=True)}
-        body_links = {
-            name: _correct_rounding(_with_inertia(updated[name]))
-            for name in poses
-            if name in updated
-        }
+        body_links = {name: _corrected(updated[name]) for name in poses if name in updated}
         updated |= _merge_into_heaviest(body_links, poses, changes)
     return [updated[link.name] for link in links]
 
@@ -76,32 +72,31 @@ def _is_rejected(link: Link) -> bool:
     return is_in_range(inertial.inertia) and not _is_valid(inertial.inertia)
 
 
-def _with_inertia(link: Link) -> Link:
-    """Return a link whose mass has an inertia, which may be zero."""
+def _corrected(link: Link) -> Link:
+    """Return a link whose mass has an inertia, a slightly larger one if it is rounded."""
     inertial = link.inertial
-    if inertial is None or inertial.inertia is not None or not _has_mass(inertial):
+    if inertial is None or not _has_mass(inertial):
         return link
-    return replace(link, inertial=replace(inertial, inertia=np.zeros((3, 3))))
+    inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
+    if is_in_range(inertia):
+        inertia = _without_rounding(inertia)
+    return replace(link, inertial=replace(inertial, inertia=inertia))
 
 
-def _correct_rounding(link: Link) -> Link:
-    """Return a link with a slightly larger inertia, if rounding made it invalid."""
-    inertia = link.inertial.inertia if link.inertial else None
-    if inertia is None or not _has_mass(link.inertial) or not is_in_range(inertia):
-        return link
+def _without_rounding(inertia: Matrix) -> Matrix:
+    """Return a slightly larger inertia if rounding made it invalid."""
     moments = principal_moments(inertia)
     if (
         moments[0] <= MIN_INERTIA
         or not _MIN_ROUNDED_RATIO <= triangle_ratio(moments) < 1 + _MIN_MOMENT_RATIO
     ):
-        return link
+        return inertia
     # The second moments of mass are tr(I) / 2 - I. A plate has one of 0, rounded to a negative
     # number.
     second, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     second_moments = (axes * np.maximum(second, _MIN_MOMENT_RATIO * second.max())) @ axes.T
-    assert link.inertial is not None
-    plate = replace(link.inertial, inertia=np.trace(second_moments) * np.eye(3) - second_moments)
-    return replace(link, inertial=plate)
+    plate: Matrix = np.trace(second_moments) * np.eye(3) - second_moments
+    return plate
 
 
 def _merge_into_heaviest(

@@ -11,7 +11,6 @@ from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
-from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.onboarding.comparison import Comparison, compare_models
 from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
 from terrainkit_robots.onboarding.source_model import described_model, load_source
@@ -168,9 +167,9 @@ def _compare(
 ) -> Verification:
     """Return the comparison of the models of the written files with their source."""
     written = robot.facts
-    described = with_world_base(
-        with_hinges_for_balls(source), floating=bool(written.model.floating)
-    )
+    described = with_hinges_for_balls(source)
+    if written.model.floating:
+        described = described.with_free_base()
     uncompared, reference = "", None
     if source.model.kind == "mjcf":
         try:

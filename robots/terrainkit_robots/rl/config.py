@@ -7,7 +7,7 @@ Subclass `Task`, or one of its sections, for a task of your own; see docs/adding
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from msgspec import Meta
 
@@ -25,6 +25,7 @@ from terrainkit.settings.type_hint import (
     PositiveFloat,
     PositiveInt,
 )
+from terrainkit_robots.rl.legged_gym_names import pasted_settings
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
 Duration = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
@@ -228,6 +229,13 @@ class Rewards(Config):
     Scales are dimensionless: masses are in units of the robot's mass, lengths of its leg length,
     and times of sqrt(leg length / g). A reward with the scale 0 is not computed.
     """
+
+    units: Literal["robot", "SI"] = "robot"
+    """Units of the scales: the robot's mass and leg length, which suit robots of any size; or SI,
+    as in legged_gym."""
+    only_positive_rewards: bool = False
+    """Whether the sum of all rewards but `termination` is at least 0 in each step, as in
+    legged_gym."""
 
     # The units in `rewards.UNITS` make the scales dimensionless. With the 15 kg and 0.448 m of the
     # bundled quadruped, many are legged_gym's; the comments give them in SI units. The ratio of the
@@ -494,6 +502,24 @@ class Task(Config):
     policy: Policy = field(default_factory=Policy)
     algorithm: Algorithm = field(default_factory=Algorithm)
     runner: Runner = field(default_factory=Runner)
+
+    @classmethod
+    def from_table(
+        cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
+    ) -> Self:
+        """Return the task that a TOML table describes; see `Config.from_table`.
+
+        The error about a setting of legged_gym names ours.
+        """
+        try:
+            return super().from_table(table, default, path)
+        except ConfigError:
+            for setting, message in pasted_settings(table):
+                try:
+                    super().from_table(setting, default, path)
+                except ConfigError:
+                    raise ConfigError(message) from None
+            raise
 
     def __post_init__(self) -> None:
         """Validate the sections, and values that depend on each other."""

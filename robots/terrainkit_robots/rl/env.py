@@ -359,6 +359,8 @@ class LeggedEnv(VecEnv):
                     term[unstable] = 0
                 total += term
             self.episode_sums[name] += term
+        if self.cfg.rewards.only_positive_rewards:
+            total = np.maximum(total, 0)
         return total + termination
 
     def update_observations(self) -> None:

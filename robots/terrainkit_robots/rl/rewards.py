@@ -80,7 +80,10 @@ def reward_scales(rewards: Rewards, mass: float, leg_length: float) -> dict[str,
     # Froude scaling: robots of different sizes that move alike have equal rewards in these units.
     time = np.sqrt(leg_length / 9.81)
     units = {k: mass**a * leg_length**b * time**c for k, (a, b, c) in UNITS.items()}
-    return {k: scale / units.get(k, 1.0) for k, scale in vars(rewards).items() if scale}
+    if rewards.units == "SI":
+        units = {}
+    scales = {k: scale for k, scale in vars(rewards).items() if scale and k != "units"}
+    return {k: scale / units.get(k, 1.0) for k, scale in scales.items()}
 
 
 def _sum_squares(values: FloatArray) -> FloatArray:

@@ -15,10 +15,7 @@ from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
-from terrainkit_robots.analysis.simulator_conventions.loading import (
-    NotAttemptedError,
-    check_mujoco_cost,
-)
+from terrainkit_robots.analysis.simulator_conventions.loading import check_mujoco_cost
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.geoms import lowest_point
@@ -110,15 +107,13 @@ def make_written_model(facts: Facts) -> WrittenModel:
 
     if any(facts.meshes.has_contents(path) for path in facts.model.sources):
         raise CannotCheckError("the file has fixes that are not written yet")
+    check_mujoco_cost(facts.model)
     try:
-        check_mujoco_cost(facts.model)
         with quiet_mujoco():
             spec = mujoco.MjSpec.from_file(str(facts.model.file))
             remove_drawings(spec)
             _add_floor(spec)
             model = spec.compile()
-    except NotAttemptedError as error:
-        raise CannotCheckError(str(error)) from None
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError):
         raise CannotCheckError("MuJoCo does not load the file (SIM004)") from None
     (free,) = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)

@@ -33,9 +33,14 @@ from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.text import count, names
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
-"""Limits of a foot above and below the ground [m], and of the base, relative to its target."""
+"""Limits of the lowest foot above and below the ground [m], and of the base, relative to its
+target."""
 
-STAND = "stands for 1 s with zero action"
+MAX_FOOT_SPREAD = 0.05
+"""Limit of the other feet above the lowest one, relative to the length of a leg: a trunk that
+stands tilted by 2 degrees."""
+
+STAND = f"stands for {seconds:g} s with zero action"
 """Name of the check of standing."""
 
 NUM_ENVS = 16
@@ -47,9 +52,14 @@ RANDOM_STEPS = 100
 DEFAULT_SAMPLES, MIN_TREND_SAMPLES = 100_000, 50_000
 """Samples of the short training, and the fewest that show whether a robot learns."""
 
-MAX_PENALTY, MAX_DROP, MAX_DEVIATIONS = 2.0, 0.1, 3.0
+MAX_PENALTY, MAX_DROP = 2.0, 0.1
 """Limits of a penalty at the end of the training and of a drop of the reward, relative to the sum
-of the positive rewards, and of an increase of the falls, in standard deviations."""
+of the positive rewards."""
+
+MAX_DEVIATIONS, MAX_INCREASE = 3.0, 0.25
+"""Limits of an increase of the falls, in standard deviations, and per robot [1/s]. Robots that
+begin to step fall more often than those that stand: by up to 0.11 in 24 trainings of 8 robots,
+which all learned to walk."""
 
 # Half of `rewards.STANDING_TRACKING` is 0.125.
 MAX_STANDING, MAX_ACTION_TORQUE = 0.135, 1.0
@@ -77,6 +87,7 @@ def smoke_test(
     options: OnboardOptions | None = None,
     *,
     samples: int = DEFAULT_SAMPLES,
+    seed: int = 1,
     progress: Progress = lambda _: None,
 ) -> ResultTable[Check]:
     """Check whether a robot can be trained for its task on a plane.
@@ -87,14 +98,16 @@ def smoke_test(
         options: Options for onboarding a file.
         samples: Samples of the short training; 0 for none. With fewer than `MIN_TREND_SAMPLES`,
             only the losses are checked.
+        seed: Seed of the random numbers of the training.
         progress: Called after each iteration of the training.
 
     Raises:
         TerrainkitError: If the robot does not exist or cannot be read.
     """
     if not (Path(name).is_file() or is_description(name)):
-        task_spec = get_task(name)
-        return run_checks(Robot.load(task_spec.folder), task_spec.task, samples, progress)
+        found = get_task(name)
+        task = with_seed(found.task, seed)
+        return run_checks(Robot.load(found.folder), task, samples, progress)
     options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(name, Path(folder) / "robot", options)
@@ -105,7 +118,8 @@ def smoke_test(
         if onboarded.folder is None:
             return make_result(onboarded.report.facts.model.title, check)
         robot = Robot.load(onboarded.folder)
-        result = run_checks(robot, default_task(robot.spec), samples, progress)
+        task = with_seed(default_task(robot.spec), seed)
+        result = run_checks(robot, task, samples, progress)
     checks = [
         replace(each, passed=False, measured=onboarded.unjudged)
         if onboarded.unjudged and each.name == STAND
@@ -113,6 +127,11 @@ def smoke_test(
         for each in result["checks"]
     ]
     return make_result(robot.spec.name, check, *checks)
+
+
+def with_seed(task: Task, seed: int) -> Task:
+    """Return a task with other random numbers."""
+    return replace(task, runner=replace(task.runner, seed=seed))
 
 
 @single_torch_thread()
@@ -155,16 +174,21 @@ def check_spawn_height(env: LeggedEnv) -> Check:
     data.qpos[2] = spec.spawn_height or 0.0
     with quiet_mujoco():
         mujoco.mj_kinematics(model, data)
-    passed = True
-    measured = []
+    heights, measured = [], []
     for foot in spec.feet:
         geoms = scene.geoms[model.geom_bodyid[scene.geoms] == model.body(foot).id]
         height = min((lowest_point(model, data, int(geom)) for geom in geoms), default=np.nan)
-        passed &= -MAX_FOOT_DEPTH <= height <= MAX_FOOT_HEIGHT  # False without a shape
+        heights.append(height)
         distance = f"{100 * height + 0.0:.1f} cm" if len(geoms) else "has no shape"
         measured.append(f"{foot} {distance}")
     above = f"{', '.join(measured)} above the ground, with spawn_height {spec.spawn_height:.4g} m"
-    expected = f"every foot within {100 * MAX_FOOT_HEIGHT:.1f} cm of the ground, none below"
+    lowest, spread = np.min(heights), MAX_FOOT_SPREAD * (spec.leg_length or 0.4)
+    # False without a shape, whose height is not a number.
+    passed = -MAX_FOOT_DEPTH <= lowest <= MAX_FOOT_HEIGHT and np.max(heights) <= lowest + spread
+    expected = (
+        f"the lowest foot within {100 * MAX_FOOT_HEIGHT:.1f} cm of the ground, none below, and the "
+        f"others at most {100 * spread:.1f} cm higher"
+    )
     return Check("spawn height", bool(passed), above, expected)
 
 
@@ -178,10 +202,11 @@ def check_observations(env: LeggedEnv) -> Iterator[Check]:
 
 
 def check_stand(env: LeggedEnv) -> Check:
-    """Check that the robots stand for one second with zero action."""
+    """Check that the robots stand for one second with zero action, on two legs for half of it."""
+    seconds = 0.5 if len(env.robot.spec.feet) == 2 else 1.0  # without balance, a biped tips over
     env.set_commands(np.zeros((env.num_envs, 3), np.float32))
     target, dt = env.robot.base_height_target, env.cfg.dt
-    for step in range(round(1 / dt)):
+    for step in range(round(seconds / dt)):
         _, _, dones, extras = env.step(torch.zeros(env.num_envs, env.num_actions))
         height = float(env.state.base_height.min())
         measured = f"base at {height:.3f} m, {100 * height / target:.0f} % of its height"
@@ -252,6 +277,8 @@ def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Chec
         measured = f"{low:.3g} to {high:.3g}"
         if not passed:
             measured = "not finite"
+        elif name == "dof_pos_limits" and not np.isfinite(env.robot.lower).any():
+            measured = "0: no joint has soft limits"
         elif low == 0 == high:
             passed = bool(reward(env).any())
             measured = "0: the rewarded event did not happen" if passed else "0 in every state"
@@ -294,7 +321,8 @@ def check_trends(record: TrainingRecord) -> Iterator[Check]:
     expected = f"at least {first - drop:.2f} /s in the last quarter of the training"
     yield Check("reward does not drop", last >= first - drop, measured, expected)
     before, after = record.falls
-    limit = before + MAX_DEVIATIONS * np.sqrt((before + after) / record.robot_seconds)
+    deviation = np.sqrt((before + after) / record.robot_seconds)
+    limit = before + max(MAX_DEVIATIONS * deviation, MAX_INCREASE)
     measured = f"{before:.3f} to {after:.3f} falls/s per robot"
     expected = f"at most {limit:.3f}; penalties that exceed the rewards teach to fall"
     yield Check("falls do not increase", bool(after <= limit), measured, expected)

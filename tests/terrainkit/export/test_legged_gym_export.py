@@ -178,7 +178,7 @@ def test_block_of_the_page_adds_both_surfaces_to_isaac_gym(load, monkeypatch):
     terrain_map = make_map("stairs")
     monkeypatch.setitem(sys.modules, "terrain", load(terrain_map))
     names = {"gym": MagicMock(), "sim": "sim"}
-    exec(page_block("integrations.md", "add_trimesh"), names)
+    exec(page_block("legged_gym.md", "add_trimesh"), names)
     names["gym"].add_triangle_mesh.assert_called_once()
     names["gym"].add_heightfield.assert_called_once()
     np.testing.assert_array_equal(names["origins"], terrain_map.env_origins)

@@ -54,7 +54,7 @@ def check_folder(file, onboarded):
     report = lint(Facts(urdf, against=Facts(mjcf), spec=spec), COMPARISON_RULES)
     assert not report.skipped
     assert not [f for f in report.findings if f.severity != "note"], report.findings
-    # They match the source, as read by yourdfpy (URDF) and MuJoCo (MJCF).
+    # They match the source.
     for written in (urdf, mjcf):
         difference = compare_link_poses(source, Facts(written), poses=100)
         assert difference.distance < 1e-4, difference

@@ -55,6 +55,13 @@ def test_out_of_range_value_is_named(name, value, message):
         with_value(Task(), name, value)
 
 
+@pytest.mark.parametrize(("text", "message"), OUT_OF_RANGE["pasted"])
+def test_setting_of_legged_gym_names_ours(text, message):
+    with pytest.raises(ConfigError) as raised:
+        Task.from_toml(text)
+    assert str(raised.value) == message
+
+
 def test_section_is_a_table_of_its_class():
     with pytest.raises(ConfigError, match=r"rewards: got Sim; expected a table \(Rewards\)"):
         Task(rewards=Sim())

@@ -150,6 +150,7 @@ def test_scales_are_in_units_of_the_robot():
     assert scales["torques"] == pytest.approx(-1 / (2 * 9.81 * length) ** 2)
     assert scales["lin_vel_z"] == pytest.approx(-9 / (length / 0.5) ** 2)
     assert scales["dof_power"] == pytest.approx(-1 / (2 * 9.81 * length / 0.5))
+    assert reward_scales(Rewards(units="SI"), 2.0, length)["lin_vel_z"] == -9
 
 
 _NONE = dict.fromkeys(REWARDS, 0.0)
@@ -163,6 +164,8 @@ def test_reward_is_sum_of_scaled_terms(random_env):
     assert env.state is not before
     touching = (env.state.penalized_force > 0.1).sum(axis=1)
     np.testing.assert_allclose(rewards, 0.02 * (-3 * touching - 0.5 * 0.01), rtol=1e-5)
+    env = random_env(rewards=replace(env.cfg.rewards, only_positive_rewards=True))
+    assert not env.step(_REST + 0.1)[1].any()
     assert (rewards < 0).all()
 
 

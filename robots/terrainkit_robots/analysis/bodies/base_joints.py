@@ -5,7 +5,6 @@ them, in place of a free joint. Planar models have two slides and a hinge.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -77,26 +76,6 @@ def _axes(joint: Joint) -> tuple[list[Matrix], list[Matrix]]:
     if not joint.moves:
         return [], []
     return ([joint.direction], []) if joint.kind == "prismatic" else ([], [joint.direction])
-
-
-def below_base(tree: Tree, base: Sequence[Joint]) -> Tree:
-    """Return the tree without the joints of a floating base and the links between them."""
-    count = tree.order.index(base[-1].child)
-    above, top = set(tree.order[:count]), tree.order[count]
-    return replace(
-        tree,
-        roots=(top, *tree.roots[1:]),
-        links={name: link for name, link in tree.links.items() if name not in above},
-        parent_joint={
-            name: joint
-            for name, joint in tree.parent_joint.items()
-            if name not in above and name != top
-        },
-        child_joints={
-            name: joints for name, joints in tree.child_joints.items() if name not in above
-        },
-        order=tree.order[count:],
-    )
 
 
 def moves_freely(base: Sequence[Joint]) -> bool:

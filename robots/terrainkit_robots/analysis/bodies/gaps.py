@@ -4,6 +4,7 @@ The boxes are larger than the shapes, so a gap between them is one between the s
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,11 +26,7 @@ def box_at_zero(body: Body, shapes: Sequence[BodyShape], meshes: Meshes) -> Matr
     """
     if not all(has_bounds(shape.geometry, meshes) for shape in shapes):
         return None
-    placed = (
-        BodyShape(geometry=shape.geometry, link=shape.link, pose=body.zero_pose @ shape.pose)
-        for shape in shapes
-    )
-    return bounds(placed, meshes)
+    return bounds((replace(shape, pose=body.zero_pose @ shape.pose) for shape in shapes), meshes)
 
 
 def box_distance(a: Matrix, b: Matrix) -> float:

@@ -40,8 +40,13 @@ class Tree:
     """Cycles of links."""
 
 
-def build_tree(model: RobotModel) -> Tree:
-    """Return the tree of a robot. The world body of MJCF is not part of it."""
+def build_tree(model: RobotModel, base: str | None = None) -> Tree:
+    """Return the tree of a robot. The world body of MJCF is not part of it.
+
+    Args:
+        model: The robot.
+        base: The root of the robot, if it is known.
+    """
     links: dict[str, Link] = {}
     for link in model.links:
         links.setdefault(link.name, link)
@@ -56,7 +61,7 @@ def build_tree(model: RobotModel) -> Tree:
     orders = {root: _depth_first(root, children) for root in links if root not in parent_joint}
     # A root whose joint was rejected is not the root of the robot; among others the first wins.
     orphans = {joint.child for joint, _ in rejected}
-    roots = sorted(orders, key=lambda root: (root in orphans, -len(orders[root])))
+    roots = sorted(orders, key=lambda root: (root != base, root in orphans, -len(orders[root])))
     return Tree(
         roots=tuple(roots),
         links=links,

@@ -21,7 +21,9 @@ def leg_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> list[Joint]:
 
 def robot_joints(bodies: Sequence[Body]) -> list[Joint]:
     """Return the moving joints, except the joints that move the base of a planar model."""
-    base = {0} if bodies and bodies[0].virtual else set()
+    # Of several bodies on the world, each is a part of the robot.
+    is_single = sum(body.parent == 0 for body in bodies) == 1
+    base = {0} if is_single and bodies[0].virtual else set()
     found = []
     for body in bodies[1:]:
         if body.parent in base:

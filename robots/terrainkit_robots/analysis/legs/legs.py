@@ -236,20 +236,14 @@ def _roles(
 
 
 def _foot_link(limb: Limb, bodies: Sequence[Body], meshes: Meshes) -> str:
-    """Return the link at the tip that is named a foot, or else has the lowest shape.
+    """Return the link that is named a foot and touches the ground or is drawn, or that touches it.
 
-    A frame without shapes, such as the frame of a sensor in the sole, is the last choice. Of the
-    parts of a split sole, it is the lowest one, or the one furthest from the trunk, so that the
-    feet of both sides are the same part.
+    Of the parts of a split sole, it is the lowest one, or the one furthest from the trunk, so that
+    the feet of both sides are the same part. Without collision shapes, it is a link with a visual
+    shape or the link with the lowest frame.
     """
     body = bodies[limb.chain[-1]]
     pose = body.zero_pose
-    distance = float(np.linalg.norm(limb.tip - pose[:3, 3]))
-    near = [
-        link
-        for link, local in zip(body.links, body.poses, strict=True)
-        if np.linalg.norm((pose @ local)[:3, 3] - limb.tip) <= 0.5 * distance + 0.01
-    ]
     places: dict[str, tuple[float, float]] = {}
     for link in body.links:
         shapes = [shape for shape in body.collisions if shape.link == link.name]
@@ -258,15 +252,13 @@ def _foot_link(limb: Limb, bodies: Sequence[Body], meshes: Meshes) -> str:
             height = min(min_height(shape, pose, meshes) for shape in shapes)
             places[link.name] = (round(height, _DIGITS), -round(math.hypot(x, y), _DIGITS))
     ground = min((height for height, _ in places.values()), default=0.0)
-    touching = {name for name, (height, _) in places.items() if height <= ground + MAX_SOLE_DEPTH}
-    visible = [link for link in body.links if link.visuals]
-    colliding = [link for link in body.links if link.name in places]
-    shaped = [link for link in near if link in colliding or link in visible]
-    ends = [link for link in body.links if link in shaped or link.name in touching]
-    candidates = (ends if shaped else colliding) or visible or near or [body.top]
-    named = [link for link in candidates if _FOOT_NAME.search(link.name)]
-    found = named or candidates
-    if shaped and not named and touching.isdisjoint(link.name for link in shaped):
-        found = shaped
-    soles = [link.name for link in found if link.name in touching]
-    return min(soles, key=places.__getitem__) if soles else found[0].name
+    touching = [name for name, (height, _) in places.items() if height <= ground + MAX_SOLE_DEPTH]
+    visible = [link.name for link in body.links if link.visuals]
+    named = [link.name for link in body.links if _FOOT_NAME.search(link.name)]
+    soles = [name for name in touching if name in named] or touching
+    drawn_feet = [name for name in named if name in visible]
+    if soles and (soles[0] in named or not drawn_feet):
+        return min(soles, key=places.__getitem__)
+    heights = [float((pose @ local)[2, 3]) for local in body.poses]
+    lowest = body.links[int(np.argmin(heights))].name
+    return [*drawn_feet, *visible, *named, lowest][0]

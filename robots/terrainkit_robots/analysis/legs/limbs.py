@@ -28,8 +28,8 @@ MIN_LEG_SCORE = 1.5
 _OTHER_NAME_COST = 1.0
 """Cost of names of other limbs, if the robot stands without this one."""
 
-# Chosen on 39 robots, together with the scores: a foot near the ground scores 1, or 0.5 if it is
-# only low, a mirror image 0.5, names of legs 0.5.
+# A foot near the ground scores 1, or 0.5 if it is only low, as that of a leg with a wrong length; a
+# mirror image scores 0.5, names of legs 0.5.
 _NEAR_GROUND, _LOW = 0.12, 0.25
 """Height of a foot above the ground over the height of the robot at zero."""
 
@@ -37,12 +37,11 @@ _MIN_ARM_HEIGHT = 0.5
 """A limb that ends this high above the rest of the robot, such as wheels or a pedestal, is an arm.
 Over the height of the robot. A leg that is folded at zero ends lower above the belly."""
 
-_MIN_ARM_RISE = 0.25
-"""The same height over the length of the limb, for robots that are flat at zero: the legs of a
-spider that are stretched sideways have 0.1, arms of published robots more than 0.5."""
-
 _MAX_MIRROR_ERROR = 0.05
 """Distance of a leaf to the mirror image of another one, at most, over the size of the robot."""
+
+_MIN_SURROUNDING = 4
+"""Number of equal limbs around the center of mass, at least, that are legs at any height."""
 
 _MIN_SEPARATE_LENGTH = 0.5
 """Unshared length over length, at least, of each of two limbs that share joints."""
@@ -131,7 +130,7 @@ def detect_limbs(
         return ()
     lower, upper = _robot_bounds(bodies, meshes)
     size = max(float(np.linalg.norm(upper - lower)), 1e-6)
-    chains = _join_loops(_chains(bodies, meshes), loops, size)
+    chains = _join_loops(_chains(bodies, meshes), loops, bodies, size)
     leaves = _leaves(chains, bodies, actuated)
     if not leaves:
         return ()
@@ -147,18 +146,44 @@ def detect_limbs(
         ),
         default=np.inf,
     )
-    is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == WORLD
+    surrounding = _surrounding(leaves, bodies, size)
+    # The slides of a planar model move its base.
+    is_planar = any(body.parent == 0 and body.virtual for body in bodies)
+    is_fixed_base = tree.order[0] == bodies[0].top.name == WORLD and not is_planar
 
     def height_score(leaf: Chain) -> float:
         foot = float(leaf.tip[2])
-        min_rise = max(_MIN_ARM_HEIGHT * height, _MIN_ARM_RISE * _length(leaf, 0))
+        if leaf in surrounding and leaf.points[0][2] - _length(leaf, 0) < rest:
+            return 1.0  # it reaches the ground, also if it is stretched sideways at zero
         ratio = (foot - ground) / height
-        is_arm = foot - rest > min_rise
+        is_arm = foot - rest > _MIN_ARM_HEIGHT * height
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
-    return _without_needless_limbs(
-        [_make_limb(leaf, leaves, bodies, size, height_score(leaf)) for leaf in leaves], bodies
-    )
+    limbs = [
+        _make_limb(leaf, leaves, bodies, size, height_score(leaf), leaf in surrounding)
+        for leaf in leaves
+    ]
+    return _without_needless_limbs(limbs, bodies)
+
+
+def _surrounding(chains: Sequence[Chain], bodies: Sequence[Body], size: float) -> list[Chain]:
+    """Return the lowest chain and its copies if they are all around the robot, as in a spider."""
+    lowest = chains[0]
+    tolerance = _MAX_MIRROR_ERROR * size
+
+    def shape(chain: Chain) -> Matrix:
+        """Return the heights of start and tip and the length of a chain, shape (3,) [m]."""
+        return np.array([chain.points[0][2], chain.tip[2], _length(chain, 0)])
+
+    def is_copy(other: Chain) -> bool:
+        is_equal = bool((np.abs(shape(lowest) - shape(other)) < tolerance).all())
+        return is_equal and len(other.joints) == len(lowest.joints)
+
+    copies = [chain for chain in chains if is_copy(chain)]
+    center = center_of_mass(bodies, [body.zero_pose for body in bodies])[:2]
+    starts = convex_hull(np.array([copy.points[0][:2] for copy in copies]))
+    is_around = len(starts) >= _MIN_SURROUNDING and margin(center, starts) > 0
+    return copies if is_around else []
 
 
 def _without_needless_limbs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Limb, ...]:
@@ -218,12 +243,9 @@ def _length(limb: Chain, start: int) -> float:
 
 
 def _chains(bodies: Sequence[Body], meshes: Meshes) -> list[Chain]:
-    """Return the chain to each body without children."""
-    parents = {body.parent for body in bodies}
+    """Return the chain to each end."""
     chains = []
-    for body in bodies[1:]:
-        if body.index in parents:
-            continue
+    for body in _ends(bodies, meshes):
         chain = ancestors(bodies, body.index)
         moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
@@ -244,18 +266,47 @@ def _chains(bodies: Sequence[Body], meshes: Meshes) -> list[Chain]:
     return chains
 
 
+def _ends(bodies: Sequence[Body], meshes: Meshes) -> list[Body]:
+    """Return the bodies without children, or instead of them a foot that touches the ground first.
+
+    A foot carries rods or toes and no longer chains.
+    """
+    children: dict[int, list[int]] = {}
+    for body in bodies[1:]:
+        children.setdefault(body.parent or 0, []).append(body.index)
+
+    def bottom(index: int) -> float:
+        body = bodies[index]
+        return float(contact_points(body, body.zero_pose, meshes)[:, 2].min())
+
+    ends = {body.index for body in bodies[1:]} - set(children)
+    feet = {
+        index: carried
+        for index, carried in children.items()
+        if index > 0 and len(carried) > 1 and ends.issuperset(carried)
+        if bottom(index) < min(map(bottom, carried))
+    }
+    ends -= {index for carried in feet.values() for index in carried}
+    return [bodies[index] for index in sorted(ends | set(feet))]
+
+
 def _join_loops(
-    chains: Sequence[Chain], loops: Sequence[tuple[int, int]], size: float
+    chains: Sequence[Chain],
+    loops: Sequence[tuple[int, int]],
+    bodies: Sequence[Body],
+    size: float,
 ) -> list[Chain]:
     """Return the chains with the numbers of the limbs that loops join them to.
 
-    A loop at a waist joins no limbs: the waist carries limbs that are mirror images.
+    A loop joins the branches of each body that it moves. A waist joins no limbs: it carries limbs
+    that are mirror images.
     """
     numbers: dict[int, int] = {}
     for number, loop in enumerate(loops):
+        ends = [set(ancestors(bodies, index)) for index in loop]
         joined = {
             k
-            for index in loop
+            for index in ends[0] ^ ends[1]
             if (side := [k for k, chain in enumerate(chains) if index in chain.chain])
             and not any(
                 _is_mirror_image(chains[a], chains[b], size) for a, b in combinations(side, 2)
@@ -279,7 +330,9 @@ def _leaves(
         return chain.chain if chain.linkage is None else chain.linkage
 
     for chain in chains:
-        own = map(id, chain.joints[: len(chain.joints) - chain.has_wheel])
+        # A single motor bends a four-bar leg; the wheel is the second one.
+        count = len(chain.joints) - (chain.has_wheel and chain.linkage is None)
+        own = map(id, chain.joints[:count])
         driven.setdefault(limb(chain), set()).update(actuated_ids.intersection(own))
     leaves = [chain for chain in chains if len(driven[limb(chain)]) >= 2]
     # A body without mass and collision is a picture of a linkage beside the leg that it follows.
@@ -290,18 +343,23 @@ def _leaves(
 
 def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:
     """Return the lower and upper corner of the bounding box of the robot at zero."""
+    shapes = (
+        replace(shape, pose=body.zero_pose @ shape.pose)
+        for body in bodies
+        for shape in body.collisions
+    )
     corners = [body.zero_pose[:3, 3] for body in bodies]
-    for body in bodies:
-        pose = body.zero_pose
-        box = bounds(body.collisions, meshes)
-        if box is not None:
-            grid = np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
-            corners += list(grid @ pose[:3, :3].T + pose[:3, 3])
+    corners += list(box) if (box := bounds(shapes, meshes)) is not None else []
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def _make_limb(
-    leaf: Chain, leaves: Sequence[Chain], bodies: Sequence[Body], size: float, score: float
+    leaf: Chain,
+    leaves: Sequence[Chain],
+    bodies: Sequence[Body],
+    size: float,
+    score: float,
+    surrounds: bool,
 ) -> Limb:
     links = [link.name for i in leaf.chain for link in bodies[i].links]
     names = [
@@ -316,15 +374,15 @@ def _make_limb(
     other_names = fingers + sum(
         bool(_OTHER_NAME.search(name)) and not _FINGER_NAME.search(name) for name in rest
     )
-    has_mirror_image = any(
+    has_image = surrounds or any(
         other is not leaf
         and _is_mirror_image(leaf, other, size)
         and not is_branch(leaf, other, size)
         for other in leaves
     )
-    score += 0.5 * has_mirror_image
-    is_hand = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
+    score += 0.5 * has_image
     is_other = other_names > leg_names
+    is_hand = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
     is_finger = (is_other and 2 * fingers > other_names) or (is_hand and not leg_names)
     score += 0.5 * (leg_names > other_names) - _OTHER_NAME_COST * is_finger
     return Limb(

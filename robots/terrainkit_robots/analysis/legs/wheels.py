@@ -14,13 +14,12 @@ from terrainkit_robots.transforms import axis_angle_to_matrix
 MAX_LIMITED_RANGE = 4 * np.pi
 """Range of a joint with useful limits, at most [rad]. Exporters write up to 1e16 for wheels."""
 
+_MIN_WHEEL_RANGE = 6.2
+"""Range of the joint of a wheel, at least [rad]: exporters write -3.14 to 3.14 without limits."""
+
 _MAX_BALANCED_OFFSET = 0.1
 """Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel or a
 propeller. Parts of legs have more than 1."""
-
-_MAX_LEG_WHEEL_OFFSET = 0.25
-"""The same ratio for a round body at the end of a leg, such as a wheel with its motor. Feet have
-0.4 and more."""
 
 _MAX_RADIUS_RATIO = 1.25
 """Largest over smallest radius of a wheel about its axis. A square has 1.41, a foot 2 and more."""
@@ -44,14 +43,20 @@ def is_balanced(body: Body, parents: Collection[int | None]) -> bool:
     """
     if body.joint is None or body.index in parents:
         return False
-    return body.mass > 0 and _mass_offset(body) < _MAX_BALANCED_OFFSET
+    # Half of the trace is the polar second moment m r^2 of the mass about its center.
+    moment = float(np.trace(body.inertia)) / 2
+    if body.mass <= 0 or moment <= 0:
+        return False
+    arm = body.center - body.joint.anchor
+    offset = float(np.linalg.norm(np.cross(arm, body.joint.direction)))
+    return offset < _MAX_BALANCED_OFFSET * math.sqrt(moment / body.mass)
 
 
 def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     """Return whether the last body of a leg is a wheel.
 
-    A wheel turns without limits, and its mass and its collision shapes are round about the axis.
-    The mass alone does not tell: the center of mass of a foot may be on the axis of an ankle.
+    A wheel makes a whole turn, and its collision shapes are round about the axis. The mass
+    does not tell: the center of mass of a foot may be on the axis of an ankle.
 
     Args:
         body: A body without children, on a joint.
@@ -59,12 +64,11 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     """
     joint = body.joint
     assert joint is not None
-    if not turns_without_limits(joint):
+    lower, upper = joint.range or (-np.inf, np.inf)
+    if joint.kind == "prismatic" or upper - lower < _MIN_WHEEL_RANGE:
         return False
     shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, meshes)]
     if not shapes:
-        return False
-    if body.mass > 0 and not _mass_offset(body) <= _MAX_LEG_WHEEL_OFFSET:
         return False
     # The radius at an angle is the depth of the lowest point below the axis, which is horizontal.
     sideways = np.cross(joint.direction, np.eye(3)[np.abs(joint.direction).argmin()])
@@ -77,13 +81,3 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
         pose[:3, 3] = -pose[:3, :3] @ joint.anchor
         radii.append(max(-min_height(shape, pose, meshes) for shape in shapes))
     return min(radii) > 0 and max(radii) <= _MAX_RADIUS_RATIO * min(radii)
-
-
-def _mass_offset(body: Body) -> float:
-    """Return the distance of the center of mass to the axis over the radius of gyration."""
-    assert body.joint is not None
-    arm = body.center - body.joint.anchor
-    offset = float(np.linalg.norm(np.cross(arm, body.joint.direction)))
-    # Half of the trace is the polar second moment m r^2 of the mass about its center.
-    moment = float(np.trace(body.inertia)) / 2
-    return offset / math.sqrt(moment / body.mass) if moment > 0 else math.inf

@@ -1,21 +1,18 @@
-"""Check whether MuJoCo and yourdfpy load a file unchanged.
+"""Check whether MuJoCo loads a file unchanged.
 
-Both open all referenced files, without limits on time and memory. Therefore the cost is estimated
-first, and a file that could take more than seconds is not passed to them.
+It opens all referenced files, without limits on time and memory. Therefore the cost is estimated
+first, and a file that could take more than seconds is not passed to it.
 """
 
 import copy
-import io
-import logging
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import one_line
 from terrainkit.settings.text import truncate
-from terrainkit_robots.analysis.bodies.tree import Tree
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
@@ -39,9 +36,6 @@ _MAX_ALLOCATION = 1_000
 
 MAX_PATHS = 20_000
 """Number of paths at which files are searched."""
-
-_UNSAFE_PROBLEMS = frozenset({"XML001", "XML010"})
-"""Problems of documents that another parser may read differently."""
 
 _UNSAFE_TAGS = frozenset(
     {"replicate", "composite", "flexcomp", "plugin", "extension", "skin", "flex"}
@@ -67,16 +61,12 @@ _FOLDER_ATTRIBUTES = frozenset({"meshdir", "texturedir", "assetdir"})
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
-class NotAttemptedError(Exception):
-    """A file is not passed to a reader. The message is the reason."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class LoadError:
-    """Why a reader does not load a file."""
+    """Why MuJoCo does not load a file."""
 
     message: str
-    """The message of the reader, on one line."""
+    """The message of MuJoCo, on one line."""
 
     element: str = ""
     """Name of the element that it refers to. Empty without one."""
@@ -94,10 +84,10 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
             so that an error in a mesh file does not hide the others; URDF only.
 
     Raises:
-        NotAttemptedError: if the file is not passed to MuJoCo.
+        CannotCheckError: if the file is not passed to MuJoCo.
     """
     if not with_meshes and model.kind != "urdf":
-        raise NotAttemptedError("only URDF is compiled without its mesh files")
+        raise CannotCheckError("only URDF is compiled without its mesh files")
     check_mujoco_cost(model, with_files=with_meshes)
     import mujoco
 
@@ -132,16 +122,16 @@ def check_mujoco_cost(model: RobotModel, *, with_files: bool = True) -> None:
         with_files: Whether MuJoCo opens the files that it refers to.
 
     Raises:
-        NotAttemptedError: if the file is not passed to MuJoCo.
+        CannotCheckError: if the file is not passed to MuJoCo.
     """
     if model.kind == "xacro":
-        raise NotAttemptedError("MuJoCo does not read xacro, and the expanded text has no file")
+        raise CannotCheckError("MuJoCo does not read xacro, and the expanded text has no file")
     if len(model.links) > MAX_BODIES:
-        raise NotAttemptedError(
+        raise CannotCheckError(
             f"number of bodies: got {len(model.links)}; expected at most {MAX_BODIES} for MuJoCo"
         )
     if not is_utf8(model.file):
-        raise NotAttemptedError("MuJoCo opens only paths that are UTF-8")
+        raise CannotCheckError("MuJoCo opens only paths that are UTF-8")
     _check_cost(model.sources, with_files=with_files)
 
 
@@ -163,7 +153,7 @@ def _without_names(model: RobotModel) -> "etree._Element":
     """Return the root of a URDF whose collisions and visuals have no names."""
     root = parse_xml(model.file, _read(model.file)).root
     if root is None:
-        raise NotAttemptedError("a file without elements is not passed to MuJoCo")
+        raise CannotCheckError("a file without elements is not passed to MuJoCo")
     root = copy.deepcopy(root)
     for shape in root.iter("collision", "visual"):
         shape.attrib.pop("name", None)
@@ -186,56 +176,18 @@ def _without_meshes(model: RobotModel) -> tuple[str, Mapping[str, bytes]]:
     return etree.tostring(root, encoding="unicode"), dict.fromkeys(files.values(), _TETRAHEDRON)
 
 
-def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
-    """Return why yourdfpy does not load the file; None if it does. Meshes are not opened.
-
-    Raises:
-        NotAttemptedError: if the file is not passed to yourdfpy.
-    """
-    if model.kind != "urdf":
-        raise NotAttemptedError("the expanded text of xacro has no file that yourdfpy could read")
-    elements = len(model.links) + len(model.joints)
-    if elements > MAX_ELEMENTS:
-        raise NotAttemptedError(
-            f"number of elements: got {elements}; expected at most {MAX_ELEMENTS} for yourdfpy"
-        )
-    if tree.cycles:
-        raise NotAttemptedError("a tree with a cycle is not passed to yourdfpy")
-    document = parse_xml(model.file, _read(model.file))
-    if document.root is None or any(p.code in _UNSAFE_PROBLEMS for p in document.problems):
-        raise NotAttemptedError("a malformed file, or one with entities, is not passed to yourdfpy")
-    from lxml import etree
-
-    data = etree.tostring(document.root)
-    import yourdfpy
-
-    log = logging.getLogger("yourdfpy")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yourdfpy.URDF.load(io.BytesIO(data), load_meshes=False, load_collision_meshes=False)
-    except MemoryError:
-        raise
-    except Exception as error:  # yourdfpy has no common base class of its errors
-        text = one_line(str(error)) or "no message"
-        return LoadError(message=truncate(f"{type(error).__name__}: {text}", 200))
-    finally:
-        log.setLevel(level)
-    return None
-
-
 def _read(path: Path) -> bytes:
     try:
         return read_bytes(path)
     except RobotFileError as error:
-        raise NotAttemptedError(str(error)) from None
+        raise CannotCheckError(str(error)) from None
 
 
 def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
     """Check all files that MuJoCo would open and all objects that it would generate.
 
     Raises:
-        NotAttemptedError: if they could be too large.
+        CannotCheckError: if they could be too large.
     """
     elements = 0
     directories = {Path()}
@@ -244,7 +196,7 @@ def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
         for element in _relevant_elements(parse_xml(source, _read(source)).root):
             elements += 1
             if elements > MAX_ELEMENTS:
-                raise NotAttemptedError(
+                raise CannotCheckError(
                     f"number of elements: expected at most {MAX_ELEMENTS} for MuJoCo"
                 )
             _check_element(element)
@@ -255,7 +207,7 @@ def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
     parents = {source.parent for source in files}
     paths = len(names) * len(parents) * len(directories)
     if paths > MAX_PATHS:
-        raise NotAttemptedError(
+        raise CannotCheckError(
             f"number of files and folders: got {paths} paths; expected at most {MAX_PATHS}"
         )
     _check_files({path for name in names for path in _candidates(name, parents, directories)})
@@ -277,18 +229,18 @@ def _check_element(element: "etree._Element") -> None:
     if tag in ("include", "model"):
         return  # the file that it refers to is one of the sources
     if tag in _UNSAFE_TAGS or not is_allowed(tag):
-        raise NotAttemptedError(f"a file with <{tag}> is not passed to MuJoCo")
+        raise CannotCheckError(f"a file with <{tag}> is not passed to MuJoCo")
     attributes = {str(name): str(value) for name, value in element.attrib.items()}
     for name, text in attributes.items():
         if (not is_allowed(tag, name) and name != "user") or "octree" in name:
-            raise NotAttemptedError(f"<{tag} {name}=...> is not passed to MuJoCo")
+            raise CannotCheckError(f"<{tag} {name}=...> is not passed to MuJoCo")
         is_allocation = tag == "size" and (name.startswith("nuser") or name == "nkey")
         if is_allocation and _size(text) > _MAX_ALLOCATION:
-            raise NotAttemptedError(f"<size {name}={truncate(text, 20)!r}> is not passed to MuJoCo")
+            raise CannotCheckError(f"<size {name}={truncate(text, 20)!r}> is not passed to MuJoCo")
     if tag == "texture":
         side = max(_size(attributes.get(name, "1")) for name in ("width", "height"))
         if side * side > _MAX_PIXELS:
-            raise NotAttemptedError(
+            raise CannotCheckError(
                 f"texture: got {side:g} pixels per side; expected at most {_MAX_PIXELS**0.5:g}"
             )
 
@@ -320,12 +272,12 @@ def _check_files(paths: set[Path]) -> None:
                 size += stream.seek(0, 2) if (real := path.resolve()) not in seen else 0
             seen.add(real)
         except (OSError, ValueError, RuntimeError) as error:
-            raise NotAttemptedError(f"{path.name} is not passed to MuJoCo: {error}") from None
+            raise CannotCheckError(f"{path.name} is not passed to MuJoCo: {error}") from None
         if head.startswith(_PNG_SIGNATURE):
             width, height = (int.from_bytes(head[k : k + 4], "big") for k in (16, 20))
             if width * height > _MAX_PIXELS:
-                raise NotAttemptedError(
+                raise CannotCheckError(
                     f"{path.name}: got {width} x {height} pixels; expected at most {_MAX_PIXELS:,}"
                 )
         if size > _MAX_BYTES:
-            raise NotAttemptedError(f"size of its meshes: expected at most {_MAX_BYTES:,} bytes")
+            raise CannotCheckError(f"size of its meshes: expected at most {_MAX_BYTES:,} bytes")

@@ -1,75 +1,29 @@
 """Read the force limits and gains of MJCF actuators."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.description.mjcf.compiled_bodies import JointScale
 from terrainkit_robots.description.mjcf.tree import Node
-from terrainkit_robots.description.model import Actuator, PositionGains, Source
+from terrainkit_robots.description.model import Actuator, PositionGains
 
 if TYPE_CHECKING:
     import mujoco
 
 
-@dataclass(frozen=True, kw_only=True)
-class ActuatorData:
-    """An actuator, before the frames around its joint scale it."""
+def read_actuators(
+    spec: "mujoco.MjSpec", node_of: Callable[[Any], Node], scales: Mapping[str, JointScale]
+) -> Iterator[Actuator]:
+    """Yield the actuators of a model.
 
-    name: str
-    source: Source
-
-    joint: str
-    """Name of the joint; empty if the actuator acts on something else."""
-
-    effort: float | None
-    """Maximum torque [N m] or force [N] on the joint; None if unlimited."""
-
-    armature: float
-    """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
-
-    gear: float
-    """Force on the joint divided by the force of the actuator."""
-
-    stiffness: float | None
-    """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
-
-    damping: float | None
-    """Derivative gain on the joint [N m s/rad] or [N s/m]; None if it is 0 or a ratio."""
-
-    commands: tuple[float, float] | None
-    """Range of the commanded force; None if it is unlimited or commands something else."""
-
-    targets: tuple[float, float] | None
-    """Range of the target position of the joint [rad] or [m]; None if it is unlimited or commands
-    something else."""
-
-    def to_actuator(self, factor: float, max_effort: float | None) -> Actuator:
-        """Return the actuator of the model.
-
-        Args:
-            factor: Factor on its force.
-            max_effort: Limit of the joint on actuator forces; None if there is none.
-        """
-        effort = None if self.effort is None else self.effort * factor
-        if max_effort is not None:
-            effort = max_effort if effort is None else min(effort, max_effort)
-        return Actuator(
-            name=self.name,
-            source=self.source,
-            joint=self.joint,
-            effort=effort,
-            gear=self.gear,
-            stiffness=None if self.stiffness is None else self.stiffness * factor,
-            commands=self.commands,
-            targets=self.targets,
-        )
-
-
-def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator[ActuatorData]:
-    """Yield the actuators of a model; `node_of` returns the node of a MuJoCo element."""
+    Args:
+        spec: The parsed spec.
+        node_of: Function that returns the node of a MuJoCo element.
+        scales: Factors of the frames around each joint, by name.
+    """
     import mujoco
 
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
@@ -77,33 +31,33 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
         node = node_of(actuator)
         gear = float(actuator.gear[0])
         joint = actuator.target if actuator.trntype in joints else ""
-        commanded = None if "plugin" in node.written else _max_commanded_force(actuator)
-        limit = _max_magnitude(
-            actuator.forcelimited, actuator.forcerange, actuator.compiler.autolimits
-        )
+        scale = scales.get(joint, JointScale())
+        control, autolimits = actuator.ctrlrange, actuator.compiler.autolimits
+        command = _max_magnitude(actuator.ctrllimited, control, autolimits)
+        commanded = None if "plugin" in node.written else _commanded_force(actuator, command)
+        limit = _max_magnitude(actuator.forcelimited, actuator.forcerange, autolimits)
         force = min((f for f in (commanded, limit) if f is not None), default=None)
-        stiffness, control = _stiffness(actuator, gear), actuator.ctrlrange
-        is_limited = (
-            _max_magnitude(actuator.ctrllimited, control, actuator.compiler.autolimits) is not None
-        )
+        stiffness = _stiffness(actuator, gear)
         low, high = sorted(float(end) / (gear or 1.0) for end in control)
-        yield ActuatorData(
+        yield Actuator(
             name=actuator.name or (f"{joint}_actuator" if joint else node.tag),
             source=node.source,
             joint=joint,
-            effort=None if force is None else force * abs(gear),
-            armature=float(getattr(actuator, "armature", 0.0)) * gear**2,
+            effort=None if force is None else force * abs(gear) * scale.force,
+            armature=float(getattr(actuator, "armature", 0.0)) * gear**2 * scale.armature,
             gear=gear,
-            stiffness=stiffness,
+            stiffness=None if stiffness is None else stiffness * scale.armature,
             # A positive value is a damping ratio.
-            damping=-float(actuator.biasprm[2]) * gear**2 if actuator.biasprm[2] < 0 else None,
+            damping=-float(actuator.biasprm[2]) * gear**2 * scale.armature
+            if actuator.biasprm[2] < 0
+            else 0.0,
             commands=None if commanded is None else (float(control[0]), float(control[1])),
-            targets=(low, high) if stiffness and is_limited and gear else None,
+            targets=(low, high) if stiffness and command is not None and gear else None,
         )
 
 
-def _max_commanded_force(actuator: Any) -> float | None:
-    """Return the largest force that a command can request; None if commands do not limit it.
+def _commanded_force(actuator: Any, command: float | None) -> float | None:
+    """Return the force of the largest command; None if commands do not limit the force.
 
     The force of a servo also depends on the joint position, so that no command limits it.
     """
@@ -116,11 +70,10 @@ def _max_commanded_force(actuator: Any) -> float | None:
     )
     constant = actuator.gaintype == mujoco.mjtGain.mjGAIN_FIXED
     free = actuator.biastype == mujoco.mjtBias.mjBIAS_NONE or not np.any(actuator.biasprm)
-    if not (direct and constant and free):
+    if command is None or not (direct and constant and free):
         return None
-    command = _max_magnitude(actuator.ctrllimited, actuator.ctrlrange, actuator.compiler.autolimits)
-    force = None if command is None else command * abs(float(actuator.gainprm[0]))
-    return force if force is None or math.isfinite(force) else None
+    force = command * abs(float(actuator.gainprm[0]))
+    return force if math.isfinite(force) else None
 
 
 def _stiffness(actuator: Any, gear: float) -> float | None:
@@ -147,37 +100,29 @@ def _max_magnitude(limited: Any, bounds: Sequence[float], autolimits: bool) -> f
     return largest if holds and math.isfinite(largest) else None
 
 
-def force_limit(joint: Any, actuators: Sequence[ActuatorData], factor: float) -> float | None:
+def force_limit(joint: Any, actuators: Sequence[Actuator], factor: float) -> float | None:
     """Return the maximum effort of the actuators of a joint; None if unlimited.
 
     Args:
         joint: The MuJoCo joint.
         actuators: Its actuators.
-        factor: Factor of the frames around the joint on forces.
+        factor: Factor of the frames around the joint on its own limit.
     """
-    limits = [
-        _max_magnitude(joint.actfrclimited, joint.actfrcrange, joint.compiler.autolimits),
-        sum(actuator.effort for actuator in actuators if actuator.effort is not None)
-        if actuators and all(actuator.effort is not None for actuator in actuators)
-        else None,
-    ]
-    known = [limit for limit in limits if limit is not None]
-    return min(known) * factor if known else None
+    own = _max_magnitude(joint.actfrclimited, joint.actfrcrange, joint.compiler.autolimits)
+    limits = [] if own is None else [own * factor]
+    efforts = [actuator.effort for actuator in actuators if actuator.effort is not None]
+    if actuators and len(efforts) == len(actuators):
+        limits.append(sum(efforts))
+    return min(limits, default=None)
 
 
-def position_gains(actuators: Sequence[ActuatorData], factor: float) -> PositionGains | None:
-    """Return the sum of the gains of the position actuators of a joint; None if it has none.
-
-    Args:
-        actuators: The actuators of the joint.
-        factor: Factor of the frames around the joint on gains.
-    """
+def position_gains(actuators: Sequence[Actuator]) -> PositionGains | None:
+    """Return the sum of the gains of the position actuators of a joint; None if it has none."""
     servos = [actuator for actuator in actuators if actuator.stiffness]
-    damping = factor * sum(actuator.damping or 0.0 for actuator in actuators)
     if not servos:
         return None
     return PositionGains(
         source=servos[0].source,
-        stiffness=factor * sum(actuator.stiffness or 0.0 for actuator in servos),
-        damping=damping or None,
+        stiffness=sum(actuator.stiffness or 0.0 for actuator in servos),
+        damping=sum(actuator.damping for actuator in actuators) or None,
     )

@@ -7,15 +7,15 @@ rules. It therefore gets a copy of the bodies with placeholders for everything t
 - A shape that needs a mesh or has an invalid size is a unit sphere without mass. A mesh that gives
   a body its mass is added as another shape, if MuJoCo compiles it.
 - An explicit inertial has a mass of 1 kg and moments of 1 kg m2.
-- A joint is a fixed body at its anchor, because the time to compile joints grows with the third
-  power of their number in a chain. In a scaled frame, a joint with limits and an armature of 1, on
-  another body, is added.
+- A joint is a body at its anchor that carries no other body, because the time to compile joints
+  grows with the third power of their number in a chain. It is fixed unless the model has a scaled
+  frame; then it has a joint with limits and an armature of 1.
 
 The compiled value of a placeholder is the scale of the value that it replaces.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,6 @@ class CompiledBodies:
 
     Args:
         spec: The parsed spec.
-        sites: The sites whose poses are needed. Others are not compiled.
         node_of: Function that returns the node of a MuJoCo element.
         report: Function that reports what MuJoCo rejects at a node.
         contents: File contents by path, which are used instead of files on disk.
@@ -65,7 +64,6 @@ class CompiledBodies:
     def __init__(
         self,
         spec: "mujoco.MjSpec",
-        sites: Iterable[Any],
         node_of: Callable[[Any], Node],
         report: Callable[[Node, str], None],
         contents: Mapping[Path, bytes],
@@ -77,22 +75,17 @@ class CompiledBodies:
         self._meshes = MeshMasses(spec, self._spec, node_of, contents)
         self._copies: dict[Any, Any] = {spec.worldbody: self._spec.worldbody}
         self._placeholders: set[Any] = set()
-        self._scaled: set[Any] = set()
-        """Copies of frames with a scale, and of everything in them."""
+        self._unit_joints: dict[Any, Any] = {}
+        """Joint in the copy of each joint, if the model has a scaled frame."""
 
-        self._unit_joints: dict[tuple[Any, bool], Any] = {}
-        """Slide or hinge joint of each scaled frame or body."""
-
-        self._scaled_joints: dict[Any, Any] = {}
-        """Unit joint with the scale of each parsed joint."""
-
+        self._is_scaled = any(map(_is_scaled, spec.frames))
         self._missing: dict[Any, list[float]] = {}
         stack = list(spec.worldbody.bodies)
         while stack:
             body = stack.pop()
             self._copy_body(body)
             stack += body.bodies
-        for site in sites:
+        for site in spec.sites:
             self._copy_shape(site)
         self._spec.compiler.degree = False
         self._spec.compiler.balanceinertia = True  # the inertia of huge geoms has rounding errors
@@ -109,7 +102,11 @@ class CompiledBodies:
         return _pose(self._data.xpos[index], self._data.xquat[index])
 
     def body_pose(self, body: Any) -> Matrix:
-        """Return the pose of a body in its parent, shape (4, 4) [m]."""
+        """Return the pose of a body in its parent, or of a joint in its body, shape (4, 4) [m].
+
+        The pose of a joint is its anchor with the orientation of the frame in which its axis is
+        written.
+        """
         index = self._copies[body].id
         return _pose(self._model.body_pos[index], self._model.body_quat[index])
 
@@ -145,18 +142,11 @@ class CompiledBodies:
         """
         return self._missing.get(body, [])
 
-    def joint_pose(self, joint: Any) -> Matrix:
-        """Return the pose of the anchor of a joint in its body, shape (4, 4) [m].
-
-        It has the orientation of the frame in which the axis is written.
-        """
-        return self.body_pose(joint)
-
     def joint_scale(self, joint: Any) -> JointScale:
         """Return the factors of the frames around a joint on its values."""
-        if joint not in self._scaled_joints:
+        if joint not in self._unit_joints:
             return JointScale()
-        model, index = self._model, self._scaled_joints[joint].id
+        model, index = self._model, self._unit_joints[joint].id
         return JointScale(
             position=float(model.jnt_range[index, 1]),
             force=float(model.jnt_actfrcrange[index, 1]),
@@ -166,13 +156,10 @@ class CompiledBodies:
     # Copies
 
     def _copy_body(self, body: Any) -> None:
-        place = self._place(body)
-        copy = place.add_body(
+        copy = self._place(body).add_body(
             pos=body.pos, quat=self._quat(body, body.quat, body.alt), info=body.info
         )
         self._copies[body] = copy
-        if place in self._scaled:
-            self._scaled.add(copy)
         if is_explicit(body):
             copy.explicitinertial, copy.mass, copy.inertia = True, 1.0, np.ones(3)
             copy.ipos = body.ipos
@@ -238,38 +225,37 @@ class CompiledBodies:
         self._missing.setdefault(body, []).append(0.0 if mass > 0 else mass)
 
     def _copy_joint(self, joint: Any) -> None:
-        """Add the anchor of a joint to the copy, and a unit joint if its values are scaled."""
+        """Add the anchor of a joint to the copy, with a unit joint if its values may be scaled."""
         import mujoco
 
-        place = self._place(joint)
-        self._copies[joint] = place.add_body(pos=joint.pos)
-        if place in self._scaled:
-            slides = joint.type == mujoco.mjtJoint.mjJNT_SLIDE
-            if (place, slides) not in self._unit_joints:
-                self._unit_joints[place, slides] = _add_unit_joint(place, slides)
-            self._scaled_joints[joint] = self._unit_joints[place, slides]
+        kinds, limited = mujoco.mjtJoint, mujoco.mjtLimited.mjLIMITED_TRUE
+        anchor = self._place(joint).add_body(pos=joint.pos)
+        self._copies[joint] = anchor
+        if self._is_scaled:
+            anchor.explicitinertial, anchor.mass, anchor.inertia = True, 1.0, np.ones(3)
+            slides = joint.type == kinds.mjJNT_SLIDE
+            self._unit_joints[joint] = anchor.add_joint(
+                type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE,
+                range=[-1, 1],
+                limited=limited,
+                actfrcrange=[-1, 1],
+                actfrclimited=limited,
+                armature=1.0,
+            )
 
     def _place(self, element: Any) -> Any:
         """Return the copy of the frame around an element, or of its body if there is none."""
-        frames = []
-        place = element.frame
-        while place is not None and place not in self._copies:
-            frames.append(place)
-            place = place.frame
-        copy = self._copies[element.parent if place is None else place]
-        for frame in reversed(frames):
-            outer = copy
-            copy = outer.add_frame(pos=frame.pos, quat=self._quat(frame, frame.quat, frame.alt))
-            self._copies[frame] = copy
-            is_scaled = outer in self._scaled
-            if hasattr(frame, "scale"):  # MuJoCo 3.16 and newer
-                scale = self._uniform_scale(frame)
-                copy.scale = np.full(3, scale)
+        frame = element.frame
+        if frame is None:
+            return self._copies[element.parent]
+        if frame not in self._copies:
+            quat = self._quat(frame, frame.quat, frame.alt)
+            copy = self._place(frame).add_frame(pos=frame.pos, quat=quat)
+            if _is_scaled(frame):
+                copy.scale = np.full(3, self._uniform_scale(frame))
                 copy.scaling, copy.massscale = frame.scaling, frame.massscale
-                is_scaled = is_scaled or scale != 1 or frame.massscale > 0
-            if is_scaled:
-                self._scaled.add(copy)
-        return copy
+            self._copies[frame] = copy
+        return self._copies[frame]
 
     def _uniform_scale(self, frame: Any) -> float:
         scale = np.asarray(frame.scale, dtype=np.float64)
@@ -306,20 +292,9 @@ class CompiledBodies:
         self._report(node, f"<{node.tag}>: {message}; MuJoCo rejects the file")
 
 
-def _add_unit_joint(place: Any, slides: bool) -> Any:
-    """Add a body with a joint to a frame or body; return the joint."""
-    import mujoco
-
-    kinds, limited = mujoco.mjtJoint, mujoco.mjtLimited.mjLIMITED_TRUE
-    body = place.add_body(explicitinertial=True, mass=1.0, inertia=np.ones(3))
-    return body.add_joint(
-        type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE,
-        range=[-1, 1],
-        limited=limited,
-        actfrcrange=[-1, 1],
-        actfrclimited=limited,
-        armature=1.0,
-    )
+def _is_scaled(frame: Any) -> bool:
+    """Return whether a frame scales what is in it, as MuJoCo 3.16 and newer can."""
+    return hasattr(frame, "scale") and bool((frame.scale != 1).any() or frame.massscale > 0)
 
 
 def is_explicit(body: Any) -> bool:

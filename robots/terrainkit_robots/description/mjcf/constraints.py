@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from terrainkit_robots.description.mjcf.compiled_bodies import CompiledBodies
 from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import WORLD, Coupling, Loop, Mimic, Tendon
 from terrainkit_robots.description.xml.number_text import number_text
@@ -15,45 +16,38 @@ from terrainkit_robots.transforms import Matrix, invert_poses, quat_to_matrix
 if TYPE_CHECKING:
     import mujoco
 
-_SOLVER = {"solref": "solref", "solimp": "solimp"}
+_SOLVER = ("solref", "solimp")
 
-GEOM_SETTINGS = {
-    name: name for name in ("friction", "condim", "priority", "solmix", "margin", "gap")
-} | _SOLVER
-"""Attribute of <geom> by field of a MuJoCo geom, for its contacts."""
+GEOM_SETTINGS = ("friction", "condim", "priority", "solmix", "margin", "gap", *_SOLVER)
+"""Fields of a MuJoCo geom for its contacts."""
 
-JOINT_SETTINGS = {
-    "solref_limit": "solreflimit",
-    "solimp_limit": "solimplimit",
-    "solref_friction": "solreffriction",
-    "solimp_friction": "solimpfriction",
-    "margin": "margin",
-    "springyield": "springyield",
-}
-"""Attribute of <joint> by field of a MuJoCo joint, for its limits and its friction."""
+_LIMIT_SOLVER = ("solref_limit", "solimp_limit", "solref_friction", "solimp_friction")
 
-_TENDON_SETTINGS = JOINT_SETTINGS | {
-    name: name
-    for name in ("range", "frictionloss", "springlength", "stiffness", "damping", "armature")
-}
+JOINT_SETTINGS = (*_LIMIT_SOLVER, "margin", "springyield")
+"""Fields of a MuJoCo joint for its limits and its friction."""
+
+_TENDON_SETTINGS = (
+    *JOINT_SETTINGS,
+    *("range", "frictionloss", "springlength", "stiffness", "damping", "armature"),
+)
 
 
-def settings_of(element: Any, default: Any, attributes: Mapping[str, str]) -> dict[str, str]:
+def settings_of(element: Any, default: Any, names: Sequence[str]) -> dict[str, str]:
     """Return the attributes of a MuJoCo element that are not the defaults, as text.
 
     Args:
         element: An element of a parsed spec.
         default: A new element of the same kind.
-        attributes: Name of the attribute by field of the element.
+        names: Fields of the element; an attribute is named like its field, without underscores.
     """
     found = {}
-    for name, attribute in attributes.items():
+    for name in names:
         # A field that this version of MuJoCo does not have is 0.
         value, usual = (np.ravel(getattr(owner, name, 0.0)) for owner in (element, default))
         if not np.array_equal(value, usual, equal_nan=True):
             if name in ("stiffness", "damping"):  # old versions read the first number only
                 value = np.trim_zeros(value, "b")
-            found[attribute] = number_text(value)
+            found[name.replace("_", "")] = number_text(value)
     return found
 
 
@@ -64,9 +58,7 @@ class Constraints:
         spec: The spec.
         node_of: Function that returns the node of a MuJoCo element.
         link_names: Name of the link of each body.
-        world_pose: Function that returns the pose of a body in the world with all joints at their
-            reference, shape (4, 4) [m].
-        site_pose: Function that returns the pose of a site in its body, shape (4, 4) [m].
+        compiled: The compiled bodies and sites.
     """
 
     def __init__(
@@ -74,8 +66,7 @@ class Constraints:
         spec: "mujoco.MjSpec",
         node_of: Callable[[Any], Node],
         link_names: Mapping[Any, str],
-        world_pose: Callable[[Any], Matrix],
-        site_pose: Callable[[Any], Matrix],
+        compiled: CompiledBodies,
     ) -> None:
         import mujoco
 
@@ -91,12 +82,9 @@ class Constraints:
         self.left_out: list[str] = []
         """What is not read, one phrase each."""
 
-        self._node_of, self._link_names = node_of, link_names
-        self._world_pose, self._site_pose = world_pose, site_pose
+        self._spec, self._node_of = spec, node_of
+        self._link_names, self._compiled = link_names, compiled
         self._driven = {actuator.target for actuator in spec.actuators}
-        self._joints = {joint.name: joint for joint in spec.joints if joint.name}
-        self._bodies = {body.name: body for body in spec.bodies if body.name}
-        self._sites = {site.name: site for site in spec.sites if site.name}
         self._default = mujoco.MjSpec()
         kinds = mujoco.mjtEq
         for number, equality in enumerate(spec.equalities, 1):
@@ -105,7 +93,7 @@ class Constraints:
             if equality.type == kinds.mjEQ_JOINT:
                 self._read_coupling(equality)
             elif equality.type == kinds.mjEQ_TENDON:
-                self._add_coupling("tendon", equality, equality.data[:5])
+                self._add_coupling("tendon", equality, equality.data[:5].tolist())
             elif equality.type in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 self._read_loop(equality, equality.name or f"loop_{number}")
             else:
@@ -114,7 +102,7 @@ class Constraints:
             self._read_tendon(tendon, tendon.name or f"tendon_{number}")
 
     def _read_coupling(self, equality: Any) -> None:
-        follower, target = (self._joints.get(n) for n in (equality.name1, equality.name2))
+        follower, target = self._ends(equality, self._spec.joint)
         values = np.array(equality.data[:5])
         if follower is None or (target is None and equality.name2) or not np.isfinite(values).all():
             return
@@ -129,7 +117,7 @@ class Constraints:
                 joint=equality.name2,
                 multiplier=multiplier,
                 offset=offset,
-                settings=settings_of(equality, self._default.add_equality(), _SOLVER),
+                settings=self._settings(equality),
             )
         else:
             self._add_coupling("joint", equality, (offset, multiplier, *higher))
@@ -142,28 +130,35 @@ class Constraints:
                 kind=kind,
                 follower=equality.name1,
                 target=equality.name2,
-                coefficients=tuple(map(float, coefficients)),
-                settings=settings_of(equality, self._default.add_equality(), _SOLVER),
+                coefficients=tuple(coefficients),
+                settings=self._settings(equality),
             )
         )
+
+    def _settings(self, equality: Any) -> dict[str, str]:
+        return settings_of(equality, self._default.add_equality(), _SOLVER)
+
+    def _ends(self, equality: Any, find: Callable[[str], Any]) -> list[Any]:
+        """Return both elements that a constraint names, None for one that does not exist."""
+        return [find(name) if name else None for name in (equality.name1, equality.name2)]
 
     def _read_loop(self, equality: Any, name: str) -> None:
         import mujoco
 
         is_weld = equality.type == mujoco.mjtEq.mjEQ_WELD
-        settings = settings_of(equality, self._default.add_equality(), _SOLVER)
+        settings = self._settings(equality)
         if is_weld and equality.data[10] != 1:
             settings["torquescale"] = number_text(equality.data[10])
         if equality.objtype == mujoco.mjtObj.mjOBJ_SITE:
-            sites = [self._sites.get(end) for end in (equality.name1, equality.name2)]
-            ends = [(site.parent, self._site_pose(site)) for site in sites if site is not None]
+            sites = [site for site in self._ends(equality, self._spec.site) if site is not None]
+            ends = [(site.parent, self._compiled.shape_pose(site)) for site in sites]
         else:
             ends = self._body_ends(equality)
         links = [self._link_names.get(body, WORLD) for body, _ in ends]
         if len(links) < 2 or WORLD in links or links[0] == links[1]:
             self.left_out.append(f"the constraint {name}, which closes no loop of the robot")
             return
-        chains = [_ancestors(body) for body, _ in ends]
+        chains = [ancestors(body) for body, _ in ends]
         if chains[0][-1] == chains[1][-1]:  # a mocap body closes no loop
             for chain, other in (chains, chains[::-1]):
                 moved = [body for body in chain if body not in other]
@@ -182,10 +177,11 @@ class Constraints:
         """Return both bodies of a constraint, and the pose of its frame in each."""
         import mujoco
 
-        bodies = [self._bodies.get(name) for name in (equality.name1, equality.name2)]
+        bodies = self._ends(equality, self._spec.body)
         if None in bodies:
             return []
-        at_reference = invert_poses(self._world_pose(bodies[0])) @ self._world_pose(bodies[1])
+        poses = [self._compiled.world_pose(body) for body in bodies]
+        at_reference = invert_poses(poses[0]) @ poses[1]
         frame = np.eye(4)
         frame[:3, 3] = equality.data[:3]
         if equality.type == mujoco.mjtEq.mjEQ_CONNECT:  # the anchor is in the first body
@@ -210,7 +206,7 @@ class Constraints:
                 points.append(float(wrap.divisor))
             elif wrap.type == kinds.mjWRAP_SITE and wrap.target is not None:
                 link = self._link_names.get(wrap.target.parent, WORLD)
-                points.append((link, self._site_pose(wrap.target)))
+                points.append((link, self._compiled.shape_pose(wrap.target)))
             else:
                 self.left_out.append(f"the tendon {name}, which wraps around a shape")
                 return
@@ -230,10 +226,10 @@ def _reference(joint: Any) -> float:
     return float(joint.ref) * (math.pi / 180 if hinge and joint.compiler.degree else 1.0)
 
 
-def _ancestors(body: Any) -> list[Any]:
+def ancestors(body: Any) -> list[Any]:
     """Return a body and the bodies that carry it, without the world."""
     found = []
-    while body is not None and body.parent is not None:
+    while body.name != WORLD:  # to ask for the parent of the world crashes MuJoCo 3.11
         found.append(body)
         body = body.parent
     return found

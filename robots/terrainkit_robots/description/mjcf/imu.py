@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from terrainkit_robots.description.mjcf.constraints import ancestors
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -18,12 +20,4 @@ def find_imu(spec: "mujoco.MjSpec") -> Any:
     sites = [site for site in spec.sites if site.parent != spec.worldbody]
     found = [site for site in sites if site.name in sensed]
     found = found or [site for site in sites if site.name.lower() == "imu"]
-    return min(found, key=lambda site: _depth(site, spec.worldbody), default=None)
-
-
-def _depth(site: Any, world: Any) -> int:
-    """Return the number of bodies above a site, without the world."""
-    depth, body = 0, site.parent
-    while body != world:
-        depth, body = depth + 1, body.parent
-    return depth
+    return min(found, key=lambda site: len(ancestors(site.parent)), default=None)

@@ -59,15 +59,15 @@ def scale_to_total_mass(links: Sequence[Link], total: float) -> tuple[Link, ...]
         return tuple(links)
     factor = total / known
     return tuple(
-        link
-        if link.inertial is None or link.inertial.mass is None
-        else replace(
-            link,
-            inertial=replace(
-                link.inertial,
-                mass=link.inertial.mass * factor,
-                inertia=None if link.inertial.inertia is None else link.inertial.inertia * factor,
-            ),
-        )
+        replace(link, inertial=_scaled(link.inertial, factor)) if link.inertial else link
         for link in links
+    )
+
+
+def _scaled(inertial: Inertial, factor: float) -> Inertial:
+    mass, inertia = inertial.mass, inertial.inertia
+    return replace(
+        inertial,
+        mass=None if mass is None else mass * factor,
+        inertia=None if inertia is None else inertia * factor,
     )

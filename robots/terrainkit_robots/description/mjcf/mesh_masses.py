@@ -34,8 +34,6 @@ class MeshMasses:
         self._meshes = {mesh_name(mesh): mesh for mesh in parsed.meshes}
         self._contents, self._bytes = contents, 0
         self._added: dict[tuple[str, int], bool] = {}
-        self._files: dict[str, tuple[str, bytes]] = {}
-        """File name and content of each mesh with a file."""
 
     def add(self, place: Any, geom: Any, quat: Any) -> bool:
         """Add a geom that has the mass of a geom with a mesh; return whether MuJoCo weighs it.
@@ -56,56 +54,57 @@ class MeshMasses:
         """Add the mesh of a geom to the copy, unless MuJoCo rejects it."""
         import mujoco
 
-        mesh = self._meshes.get(geom.meshname)
-        if mesh is None or not self._read(mesh, geom.meshname):
+        name = geom.meshname
+        mesh = self._meshes.get(name)
+        data = None if mesh is None else self._data(mesh)
+        if data is None:
             return False
         trial = mujoco.MjSpec()
-        self._write(trial, mesh, geom.meshname)
+        _write_mesh(trial, mesh, name, data)
         body = trial.worldbody.add_body()
-        _add_geom(body, geom, geom.meshname)
+        _add_geom(body, geom, name)
         body.add_freejoint()
         try:
             with quiet_mujoco():
                 mass = float(trial.compile().body_mass[1])
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError):
             return False
-        if geom.meshname not in {mesh.name for mesh in self._copy.meshes}:
-            self._write(self._copy, mesh, geom.meshname)
+        if name not in {mesh.name for mesh in self._copy.meshes}:
+            _write_mesh(self._copy, mesh, name, data)
         return 0 < mass < math.inf
 
-    def _read(self, mesh: Any, name: str) -> bool:
-        """Read the file of a mesh, if it has one; return whether it can be used."""
+    def _data(self, mesh: Any) -> dict[str, bytes] | None:
+        """Return the file of a mesh, none if it has its points; None if it cannot be used."""
         file = mesh_file(mesh, self._node_of(mesh), bool(self._parsed.strippath))
         if file is None:
-            return len(mesh.uservert) > 0
-        if file.path.suffix.lower() not in _FORMATS:
-            return False
+            return {} if len(mesh.uservert) else None
+        suffix = file.path.suffix.lower()
+        if suffix not in _FORMATS:
+            return None
         data = self._contents.get(file.path)
         if data is None:
             try:
                 with open_regular(file.path) as stream:
                     data = stream.read(MAX_BYTES - self._bytes + 1)
             except (OSError, ValueError):
-                return False
+                return None
         self._bytes += len(data)
-        self._files[name] = f"{len(self._files)}{file.path.suffix.lower()}", data
-        return self._bytes <= MAX_BYTES
+        return {f"{len(self._copy.assets)}{suffix}": data} if self._bytes <= MAX_BYTES else None
 
-    def _write(self, spec: Any, mesh: Any, name: str) -> None:
-        """Add a mesh to a spec, with the data that was read."""
-        file, data = self._files.get(name, ("", b""))
-        spec.add_mesh(
-            name=name,
-            file=file,
-            uservert=[] if file else mesh.uservert,
-            userface=[] if file else mesh.userface,
-            scale=mesh.scale,
-            refpos=mesh.refpos,
-            refquat=mesh.refquat,
-            inertia=mesh.inertia,
-        )
-        if file:
-            spec.assets = {**spec.assets, file: data}
+
+def _write_mesh(spec: Any, mesh: Any, name: str, data: Mapping[str, bytes]) -> None:
+    """Add a mesh to a spec, with the content of its file by name, or with its own points."""
+    spec.assets = {**spec.assets, **data}
+    spec.add_mesh(
+        name=name,
+        file=next(iter(data), ""),
+        uservert=[] if data else mesh.uservert,
+        userface=[] if data else mesh.userface,
+        scale=mesh.scale,
+        refpos=mesh.refpos,
+        refquat=mesh.refquat,
+        inertia=mesh.inertia,
+    )
 
 
 def _add_geom(place: Any, geom: Any, mesh: str, **pose: Any) -> None:

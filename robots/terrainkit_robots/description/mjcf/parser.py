@@ -4,11 +4,12 @@ MuJoCo stops at the first error. The rejected element is reported and removed, a
 parsed again.
 """
 
-import itertools
 import re
 import time
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections import defaultdict
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
@@ -16,6 +17,7 @@ from terrainkit_robots.description.fix import number_fix
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.text import UniqueNames
 
 if TYPE_CHECKING:
     import mujoco
@@ -31,47 +33,28 @@ _MIN_SIMILARITY = 0.7
 
 _COUNTS: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(("mass", "density", "armature", "ref", "margin", "timestep"), (1,)),
+    **dict.fromkeys(("frictionloss", "springref", "kp", "kv"), (1,)),
     **dict.fromkeys(("range", "actuatorfrcrange", "ctrlrange", "forcerange"), (2,)),
     **dict.fromkeys(("pos", "axis", "zaxis", "euler", "diaginertia", "gravity"), (3,)),
-    **dict.fromkeys(("quat", "axisangle", "rgba"), (4, 3)),
+    **dict.fromkeys(("quat", "axisangle", "rgba"), (4,)),
     **dict.fromkeys(("xyaxes", "fromto", "fullinertia"), (6,)),
-    "size": (3, 2, 1),
+    **dict.fromkeys(("size", "friction"), (3, 2, 1)),
+    **dict.fromkeys(("damping", "stiffness"), (1, 2, 3)),
     "scale": (3, 1),
-    "friction": (3, 2, 1),
-    "damping": (1, 2, 3),
-    "stiffness": (1, 2, 3),
-    "frictionloss": (1,),
-    "springref": (1,),
-    "solref": (2,),
+    "solref": (2, 1),
     "solimp": (5, 4, 3, 2, 1),
     "gear": (6, 5, 4, 3, 2, 1),
-    "kp": (1,),
-    "kv": (1,),
 }
-"""Number of values of an attribute, the most likely first; fewer may be allowed."""
-
-_EXACT = frozenset(
-    [
-        "mass",
-        "pos",
-        "axis",
-        "zaxis",
-        "euler",
-        "diaginertia",
-        "quat",
-        "axisangle",
-        "xyaxes",
-        "fromto",
-        "fullinertia",
-    ]
-)
-"""Attributes for which MuJoCo requires exactly that many values."""
+"""Numbers of values that an attribute may have, the most likely first."""
 
 _INFINITE_ALLOWED = frozenset({"ctrlrange", "forcerange", "actuatorfrcrange"})
 """Ranges that may be infinite."""
 
-_DEFAULTS = {"mass": "0", "pos": "0 0 0"}
-"""Values for missing attributes, so that the rest of the element is read."""
+_OTHER_VALUES = frozenset({("flag", "gravity"), ("flag", "frictionloss"), ("light", "range")})
+"""Elements and attributes whose values are words, or of another number."""
+
+_DEFAULTS = {"mass": "nan", "pos": "0 0 0"}
+"""Values for missing attributes, so that the rest of the element is read. A missing mass is NaN."""
 
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "fullinertia")
 
@@ -118,31 +101,34 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
     MuJoCo reports only one at a time, and accepts NaN.
     """
     for name, text in list(node.attributes.items()):
-        if name not in _COUNTS or node.tag == "flag":  # its attributes are words
+        if name not in _COUNTS or (node.tag, name) in _OTHER_VALUES:
             continue
         words = text.lower().replace("+", "").split()
         if name in _INFINITE_ALLOWED and any(word in ("inf", "-inf") for word in words):
             words = ["0" if word in ("inf", "-inf") else word for word in words]
         counts = _COUNTS[name]
-        count = (
-            counts[0] if name in _EXACT or (node.tag, name) == ("joint", "range") else len(words)
-        )
+        count = counts[0] if len(counts) == 1 else len(words)
         if not words or parse_numbers(" ".join(words), count) is not None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
-        expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
-        tree.add_problem(
-            node,
-            "XML006",
-            f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-            + (", with decimal points and separated by spaces" if repaired else ""),
-            attribute=name,
-            fix=number_fix(node.source, name, repaired),
-        )
-        if repaired:
-            node.attributes[name] = repaired
-        else:
-            del node.attributes[name]
+        _reject_number(tree, node, name, repaired=repaired)
+
+
+def _reject_number(
+    tree: MjcfTree, node: Node, name: str, *, expected: str = "", repaired: str = ""
+) -> None:
+    """Report an attribute that is not numbers, and repair or remove it."""
+    count = _COUNTS.get(name, (0,))[0]
+    expected = expected or ("a number" if count == 1 else f"{count or 'other'} numbers")
+    expected += ", with decimal points and separated by spaces" if repaired else ""
+    got = truncate(node.attributes[name], 40)
+    message = f"{name} of <{node.tag}>: got {got!r}; expected {expected}"
+    fix = number_fix(node.source, name, repaired)
+    tree.add_problem(node, "XML006", message, attribute=name, fix=fix)
+    if repaired:
+        node.attributes[name] = repaired
+    else:
+        del node.attributes[name]
 
 
 # Repairs
@@ -162,7 +148,7 @@ def _repair(tree: MjcfTree, lines: list[Node], error: str) -> bool:
         if match and repair(tree, node, match):
             return True
     _report_rejected(tree, node, message)
-    return _remove(node)
+    return node.remove()
 
 
 def _clean_message(error: str) -> str:
@@ -170,13 +156,6 @@ def _clean_message(error: str) -> str:
     text = error.partition("Element '")[0]
     text = re.sub(r"(XML )?Error:|could not parse model file with error:", " ", text)
     return " ".join(text.split())
-
-
-def _remove(node: Node) -> bool:
-    if node.parent is None:
-        return False
-    node.remove()
-    return True
 
 
 def _report_rejected(tree: MjcfTree, node: Node, message: str) -> None:
@@ -202,7 +181,7 @@ def _similar_nodes(
     return [node, *others]
 
 
-def _count_suffix(nodes: list[Node]) -> str:
+def _count_suffix(nodes: Sequence[Node]) -> str:
     if len(nodes) == 1:
         return ""
     return f" ({len(nodes)} times, next on line {nodes[1].source.line})"
@@ -213,17 +192,8 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
     if name not in node.attributes:
         return False
     nodes = _similar_nodes(tree, node, attribute=name)
-    suggestion = closest(
-        name, _schema().get(node.tag, frozenset()) - node.attributes.keys(), _MIN_SIMILARITY
-    )
-    what = f"attribute {name} of <{node.tag}> is unknown to {_mujoco()}, which rejects the file"
-    tree.add_problem(
-        node,
-        "XML007",
-        what + _count_suffix(nodes) + (f"; did you mean {suggestion}?" if suggestion else ""),
-        attribute=name,
-        severity="error",
-    )
+    known = _schema().attributes[node.tag] - node.attributes.keys()
+    suggestion = _report_unknown(tree, nodes, f"attribute {name} of <{node.tag}>", name, known)
     for same in nodes:
         value = same.attributes.pop(name)
         if suggestion and suggestion not in same.attributes and is_allowed(same.tag, suggestion):
@@ -236,16 +206,9 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     if node.parent is None:
         return False
     nodes = _similar_nodes(tree, node)
-    suggestion = closest(
-        node.tag, _allowed_children().get(node.parent.tag, frozenset(_schema())), _MIN_SIMILARITY
-    )
-    what = f"<{node.tag}> in <{node.parent.tag}> is unknown to {_mujoco()}, which rejects the file"
-    tree.add_problem(
-        node,
-        "XML007",
-        what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
-        severity="error",
-    )
+    parent = node.parent.tag
+    known = _schema().children[parent] | {"include"}
+    suggestion = _report_unknown(tree, nodes, f"<{node.tag}> in <{parent}>", "", known)
     for same in nodes:
         if (
             suggestion
@@ -258,26 +221,32 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     return True
 
 
-def _mujoco() -> str:
+def _report_unknown(
+    tree: MjcfTree, nodes: Sequence[Node], what: str, attribute: str, known: Collection[str]
+) -> str:
+    """Report an unknown attribute or element; return a similar known name, or an empty string."""
     import mujoco
 
-    return f"MuJoCo {mujoco.__version__}"
+    suggestion = closest(attribute or nodes[0].tag, known, _MIN_SIMILARITY)
+    meant = suggestion if attribute else f"<{suggestion}>"
+    tree.add_problem(
+        nodes[0],
+        "XML007",
+        f"{what} is unknown to MuJoCo {mujoco.__version__}, which rejects the file"
+        + _count_suffix(nodes)
+        + (f"; did you mean {meant}?" if suggestion else ""),
+        attribute=attribute,
+        severity="error",
+    )
+    return suggestion
 
 
 def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match["name"]
     if name not in node.attributes:
         return False
-    text = node.attributes.pop(name)
-    counts = _COUNTS.get(name)
-    if "large" in match[0]:
-        expected = "a smaller number"
-    elif counts is None:
-        expected = "other numbers"
-    else:
-        expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
-    message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-    tree.add_problem(node, "XML006", message, attribute=name)
+    expected = "a smaller number" if "large" in match[0] else ""
+    _reject_number(tree, node, name, expected=expected)
     return True
 
 
@@ -288,9 +257,8 @@ def _missing_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         tree.add_problem(node, "XML013", message, attribute=name)
     if name in _DEFAULTS and name not in node.attributes:
         node.attributes[name] = _DEFAULTS[name]
-        node.defaults.add(name)
         return True
-    return _remove(node)
+    return node.remove()
 
 
 def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
@@ -310,46 +278,51 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         tree.add_problem(duplicates[0], "TRE001", message)
     else:
         _report_rejected(tree, node, match[0])
-    taken = {n.attributes.get("name") for n in tree.nodes()}
-    numbers = itertools.count(2)
+    names = UniqueNames([name, *(n.attributes.get("name", "") for n in tree.nodes())])
     for duplicate in duplicates:
-        free = (new for k in numbers if (new := f"{name}_{k}") not in taken)
-        duplicate.attributes["name"] = next(free)
+        duplicate.attributes["name"] = names.add(name)
+    return True
+
+
+def _remove_attributes(
+    tree: MjcfTree,
+    node: Node,
+    match: re.Match[str],
+    *,
+    names: Sequence[str] = (),
+    keep: int = 0,
+) -> bool:
+    """Remove the attributes with some names, which MuJoCo's message gives by default.
+
+    The first ones are kept if only that many are allowed.
+    """
+    names = names or match.groups() or re.findall(r"'(\w+)'", match.string)
+    rejected = [name for name in node.attributes if name in names][keep:]
+    if not rejected:
+        return False
+    _report_rejected(tree, node, match.string)
+    for name in rejected:
+        del node.attributes[name]
     return True
 
 
 def _invalid_value(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Remove an attribute with an invalid value from all similar nodes."""
-    value = match[1]
-    name = next((k for k, v in node.attributes.items() if v == value and k != "name"), None)
-    if name is None:
-        return False
-    nodes = _similar_nodes(tree, node, attribute=name, value=value)
-    _report_rejected(tree, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
+    names = [k for k, v in node.attributes.items() if v == match[1] and k != "name"]
+    return bool(names) and _remove_value(tree, node, names[0], f"{match[0]} in {names[0]}")
+
+
+def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
+    value = node.attributes.get("childclass", "")
+    return bool(value) and _remove_value(tree, node, "childclass", f"{match[0]} {value!r}")
+
+
+def _remove_value(tree: MjcfTree, node: Node, name: str, message: str) -> bool:
+    """Remove an attribute from a node, and from all similar nodes with the same value."""
+    nodes = _similar_nodes(tree, node, attribute=name, value=node.attributes[name])
+    _report_rejected(tree, node, message + _count_suffix(nodes))
     for same in nodes:
         del same.attributes[name]
-    return True
-
-
-def _invalid_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
-    """Remove the attribute that MuJoCo's message names."""
-    name = match[1]
-    if name not in node.attributes:
-        return False
-    _report_rejected(tree, node, match.string)
-    del node.attributes[name]
-    return True
-
-
-def _exclusive_attributes(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
-    """Keep the first of several mutually exclusive attributes."""
-    named = re.findall(r"'(\w+)'", match.string) or _ORIENTATIONS
-    given = [name for name in node.attributes if name in named]
-    if len(given) < 2:
-        return False
-    _report_rejected(tree, node, match.string)
-    for name in given[1:]:
-        del node.attributes[name]
     return True
 
 
@@ -361,17 +334,6 @@ def _not_unique(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     _report_rejected(tree, children[1], match.string)
     for child in children[1:]:
         child.remove()
-    return True
-
-
-def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
-    value = node.attributes.get("childclass", "")
-    if not value:
-        return False
-    nodes = _similar_nodes(tree, node, attribute="childclass", value=value)
-    _report_rejected(tree, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
-    for same in nodes:
-        del same.attributes["childclass"]
     return True
 
 
@@ -391,15 +353,6 @@ def _renamed_default(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     return True
 
 
-def _zero_quaternion(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
-    name = next((k for k in node.attributes if "quat" in k), None)
-    if name is None:
-        return False
-    _report_rejected(tree, node, match.string)
-    del node.attributes[name]
-    return True
-
-
 _Repair = Callable[[MjcfTree, Node, "re.Match[str]"], bool]
 
 _REPAIRS: tuple[tuple[str, _Repair], ...] = (
@@ -416,10 +369,14 @@ _REPAIRS: tuple[tuple[str, _Repair], ...] = (
     (r"unknown default class name '(.*)'", _invalid_value),
     (r"unknown default childclass", _unknown_childclass),
     (r"default class '.*' cannot be renamed", _renamed_default),
-    (r"zero quaternion", _zero_quaternion),
-    (r"multiple orientation specifiers|at most one of", _exclusive_attributes),
+    (r"zero quaternion", partial(_remove_attributes, names=("quat", "refquat"))),
+    (
+        r"multiple orientation specifiers",
+        partial(_remove_attributes, names=_ORIENTATIONS, keep=1),
+    ),
+    (r"at most one of", partial(_remove_attributes, keep=1)),
     (r"unique element '(.+?)' found", _not_unique),
-    (r"attribute:? '(.+?)'", _invalid_attribute),
+    (r"attribute:? '(.+?)'", _remove_attributes),
 )
 """Patterns of MuJoCo's messages and their repairs; the first repair that succeeds is used."""
 
@@ -427,43 +384,30 @@ _REPAIRS: tuple[tuple[str, _Repair], ...] = (
 # MuJoCo schema
 
 
-@cache
-def _schema() -> Mapping[str, frozenset[str]]:
-    """Return the attributes of each element, wherever it occurs."""
-    schema: dict[str, frozenset[str]] = {}
-    for _, tag, attributes in _schema_rows():
-        schema[tag] = schema.get(tag, frozenset()) | attributes
-    return schema
+@dataclass(frozen=True, kw_only=True)
+class _Schema:
+    """The attributes and the children of each element, wherever it occurs, by tag."""
+
+    attributes: defaultdict[str, set[str]]
+    children: defaultdict[str, set[str]]
 
 
 @cache
-def _allowed_children() -> Mapping[str, frozenset[str]]:
-    """Return the elements that each element may contain."""
-    allowed: dict[str, set[str]] = {}
-    path: list[str] = []
-    for depth, tag, _ in _schema_rows():
-        del path[depth:]
-        if path:
-            allowed.setdefault(path[-1], set()).add(tag)
-        path.append(tag)
-    inside = allowed.get("body", set()) | {"body", "frame", "replicate"}
-    for tag in ("body", "worldbody", "frame", "replicate"):
-        allowed[tag] = inside
-    return {tag: frozenset(children | {"include"}) for tag, children in allowed.items()}
-
-
-@cache
-def _schema_rows() -> tuple[tuple[int, str, frozenset[str]], ...]:
-    """Return depth, tag and attributes of each row of MuJoCo's schema table."""
+def _schema() -> _Schema:
+    """Return MuJoCo's schema."""
     import mujoco
 
-    rows: list[tuple[int, str, frozenset[str]]] = []
+    schema = _Schema(attributes=defaultdict(set), children=defaultdict(set))
+    path: list[str] = []
     for line in mujoco.mj_printSchema(False, False).splitlines():
         row = re.match(r"( *)(\S+) \([!?*R]\)(.*)", line)
         if row:
+            del path[len(row[1]) // 3 :]
             tag = row[2].replace("(world)", "")
-            rows.append((len(row[1]) // 3, tag, frozenset(row[3].split())))
-        elif rows and line.strip():
-            depth, tag, attributes = rows[-1]
-            rows[-1] = (depth, tag, attributes | frozenset(line.split()))
-    return tuple(rows)
+            schema.children[path[-1] if path else ""].add(tag)
+            path.append(tag)
+        if path:
+            schema.attributes[path[-1]].update((row[3] if row else line).split())
+    inside = schema.children["body"] | {"body", "frame", "replicate"}
+    schema.children.update(dict.fromkeys(("body", "worldbody", "frame", "replicate"), inside))
+    return schema

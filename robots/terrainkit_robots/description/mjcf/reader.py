@@ -7,7 +7,7 @@ Masses that depend on a mesh that MuJoCo does not compile are NaN.
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.description.mjcf.actuators import (
-    ActuatorData,
     force_limit,
     position_gains,
     read_actuators,
@@ -59,7 +58,7 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers
-from terrainkit_robots.text import names
+from terrainkit_robots.text import UniqueNames, count, names
 
 if TYPE_CHECKING:
     import mujoco
@@ -83,7 +82,7 @@ def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None)
         kind="mjcf",
         file=doc.file,
         source=mjcf.root.source,
-        sources=mjcf.sources,
+        sources=tuple(mjcf.sources),
     )
     if spec is not None:
         model = _SpecReader(mjcf, spec, lines, contents or {}).fill(model)
@@ -108,13 +107,8 @@ class _SpecReader:
         self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
         self._materials = {material.name: material for material in spec.materials}
         self._paired = {name for p in spec.pairs for name in (p.geomname1, p.geomname2)} - {""}
-        self._bodies = _Names(body.name for body in spec.bodies)
-        self._joints = _Names(joint.name for joint in spec.joints)
-        self._actuators = tuple(read_actuators(spec, self._node))
-        self._joint_actuators: dict[str, list[ActuatorData]] = {}
-        for actuator in self._actuators:
-            self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
-        self._force_scales: dict[str, float] = {}
+        self._bodies = UniqueNames(body.name for body in spec.bodies)
+        self._joints = UniqueNames(joint.name for joint in spec.joints)
         new_body = mujoco.MjSpec().worldbody.add_body()
         self._new_joint, self._new_geom = new_body.add_joint(), new_body.add_geom()
         self._links = {spec.worldbody: WORLD}
@@ -126,25 +120,17 @@ class _SpecReader:
 
         imu = find_imu(self._spec)
         try:
-            sites = [imu] if imu is not None else []
-            if self._spec.equalities or self._spec.tendons:
-                sites += [site for site in self._spec.sites if site != imu]
-            self._compiled = CompiledBodies(
-                self._spec, sites, self._node, self._report, self._contents
-            )
+            self._compiled = CompiledBodies(self._spec, self._node, self._report, self._contents)
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
             reason, _, location = str(error).removeprefix("Error: ").partition("\n")
             message = f"MuJoCo rejects the file: {reason}; the robot is not checked"
             self._report(self._node_of_line(location), message)
             return model
+        scales = {j.name: self._compiled.joint_scale(j) for j in self._spec.joints if j.name}
+        self._actuators = tuple(read_actuators(self._spec, self._node, scales))
         links, joints = self._read_bodies()
-        constraints = Constraints(
-            self._spec,
-            self._node,
-            self._links,
-            self._compiled.world_pose,
-            self._compiled.shape_pose,
-        )
+        efforts = {joint.name: joint.effort for joint in joints}
+        constraints = Constraints(self._spec, self._node, self._links, self._compiled)
         joints = [
             replace(
                 joint,
@@ -163,7 +149,7 @@ class _SpecReader:
             model,
             links=scale_to_total_mass(links, float(compiler.settotalmass)),
             joints=tuple(joints),
-            actuators=self._scaled_actuators(joints),
+            actuators=tuple(_within_limit(a, efforts.get(a.joint)) for a in self._actuators),
             options=self._options(),
             keyframe=self._keyframe_positions(joints),
             imu=imu and (self._links[imu.parent], self._compiled.shape_pose(imu)),
@@ -175,7 +161,11 @@ class _SpecReader:
             loops=tuple(constraints.loops),
             couplings=tuple(constraints.couplings),
             tendons=tuple(constraints.tendons),
-            left_out=(*constraints.left_out, *self._left_keyframes()),
+            left_out=(
+                *constraints.left_out,
+                *self._left_keyframes(),
+                *(f"{count(n, 'element')} of <{tag}>" for tag, n in self._mjcf.unread.items()),
+            ),
         )
 
     def _check_euler_angles(self) -> None:
@@ -223,15 +213,6 @@ class _SpecReader:
             self._reported.add(message)
             self._mjcf.add_problem(node, "XML011", message)
 
-    def _scaled_actuators(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
-        max_efforts = {joint.name: joint.effort for joint in joints}
-        return tuple(
-            actuator.to_actuator(
-                self._force_scales.get(actuator.joint, 1.0), max_efforts.get(actuator.joint)
-            )
-            for actuator in self._actuators
-        )
-
     # Bodies
 
     def _read_bodies(self) -> tuple[list[Link], list[Joint]]:
@@ -241,7 +222,7 @@ class _SpecReader:
         while stack:
             body = stack.pop()
             node = self._node(body)
-            name = body.name or self._bodies.unused(node.default_name or "unnamed_body")
+            name = body.name or self._bodies.add(node.default_name or "unnamed_body")
             self._links[body] = name
             virtual_links, body_joints = self._read_joints(body, node, name)
             links += [*virtual_links, self._link(body, node, name)]
@@ -281,10 +262,9 @@ class _SpecReader:
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         elif "diaginertia" in written.attributes:
             inertia = np.diag(body.inertia)
-        known = "mass" in written.attributes and "mass" not in written.defaults
         return Inertial(
             source=written.source,
-            mass=float(body.mass) * mass_scale if known else None,
+            mass=None if math.isnan(body.mass) else float(body.mass) * mass_scale,
             origin=origin,
             inertia=None if inertia is None else inertia * moments[0],
             attribute=_first(written, ("fullinertia", "diaginertia")),
@@ -311,14 +291,13 @@ class _SpecReader:
             priority=int(geom.priority),
             condim=int(geom.condim),
             settings=settings_of(geom, self._new_geom, GEOM_SETTINGS),
+            fit_to_mesh=fitted,
         )
-        mesh = self._meshes.get(geom.meshname)
-        if mesh is None or not (shape == "mesh" or fitted):
-            return replace(geometry, fit_to_mesh=fitted)
-        file = mesh_file(mesh, self._node(mesh), bool(self._spec.strippath))
-        if file is not None:
-            geometry = mesh_geometry(geometry, mesh, file, self._compiled.mesh_scale(geom))
-        return replace(geometry, fit_to_mesh=fitted)
+        mesh = self._meshes.get(geom.meshname) if shape == "mesh" or fitted else None
+        file = mesh and mesh_file(mesh, self._node(mesh), bool(self._spec.strippath))
+        if file is None:
+            return geometry
+        return mesh_geometry(geometry, mesh, file, self._compiled.mesh_scale(geom))
 
     def _bits(self, geom: Any) -> tuple[int, int]:
         """Return contype and conaffinity."""
@@ -334,43 +313,36 @@ class _SpecReader:
 
     def _read_joints(self, body: Any, node: Node, name: str) -> tuple[list[Link], list[Joint]]:
         """Return the joints of a body, and virtual links between them if there are several."""
-        parent, origin = self._links[body.parent], self._compiled.body_pose(body)
-        body_joints = list(body.joints)
-        if not body_joints:
-            fixed = Joint(
-                name=self._joints.unused(f"{name}_fixed"),
-                source=node.source,
-                kind="fixed",
-                parent=parent,
-                child=name,
-                origin=origin,
-            )
-            return [], [fixed]
         links: list[Link] = []
         joints: list[Joint] = []
-        for k, joint in enumerate(body_joints, 1):
-            written = self._node(joint, node)
-            own = joint.name or self._joints.unused(f"{name}_joint")
-            child = name if k == len(body_joints) else self._bodies.unused(f"{name}:{own}")
+        parent, origin = self._links[body.parent], self._compiled.body_pose(body)
+        own_joints = self._own_joints(body, node, name)
+        for k, joint in enumerate(own_joints, 1):
+            child = name if k == len(own_joints) else self._bodies.add(f"{name}:{joint.name}")
             if child != name:
-                links.append(Link(name=child, source=written.source, virtual=True))
-            joints.append(
-                replace(
-                    self._joint(joint, written, own),
-                    parent=parent,
-                    child=child,
-                    origin=origin if k == 1 else np.eye(4),
-                )
-            )
-            parent = child
+                links.append(Link(name=child, source=joint.source, virtual=True))
+            joints.append(replace(joint, parent=parent, child=child, origin=origin))
+            parent, origin = child, np.eye(4)
         return links, joints
+
+    def _own_joints(self, body: Any, node: Node, name: str) -> list[Joint]:
+        """Return the joints of a body without their links, a fixed joint if it has none."""
+        if not len(body.joints):
+            fixed = self._joints.add(f"{name}_fixed")
+            return [Joint(name=fixed, source=node.source, kind="fixed", parent="", child="")]
+        return [
+            self._joint(
+                joint, self._node(joint, node), joint.name or self._joints.add(f"{name}_joint")
+            )
+            for joint in body.joints
+        ]
 
     def _joint(self, joint: Any, node: Node, name: str) -> Joint:
         """Return a joint without its parent and child."""
         import mujoco
 
         kinds = mujoco.mjtJoint
-        frame, scale = self._compiled.joint_pose(joint), self._compiled.joint_scale(joint)
+        frame, scale = self._compiled.body_pose(joint), self._compiled.joint_scale(joint)
         bare = Joint(
             name=name,
             source=node.source,
@@ -390,10 +362,9 @@ class _SpecReader:
             return replace(bare, anchor=frame[:3, 3])
         slides = joint.type == kinds.mjJNT_SLIDE
         unit = scale.position if slides else math.pi / 180 if joint.compiler.degree else 1.0
-        self._force_scales[joint.name] = scale.force
-        actuators = self._joint_actuators.get(joint.name, []) if joint.name else []
+        actuators = [a for a in self._actuators if a.joint and a.joint == joint.name]
         limits = self._range(joint, node)
-        armature = float(joint.armature) + sum(actuator.armature for actuator in actuators)
+        own_armature = float(joint.armature) * scale.armature
         return replace(
             bare,
             kind="prismatic" if slides else "continuous" if limits is None else "revolute",
@@ -401,10 +372,10 @@ class _SpecReader:
             anchor=frame[:3, 3],
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
-            armature=armature * scale.armature,
+            armature=own_armature + sum(actuator.armature for actuator in actuators),
             spring_reference=float(joint.springref) * unit,
             settings=settings_of(joint, self._new_joint, JOINT_SETTINGS),
-            position_gains=position_gains(actuators, scale.armature),
+            position_gains=position_gains(actuators),
         )
 
     def _range(self, joint: Any, node: Node) -> tuple[float, float] | None:
@@ -433,32 +404,29 @@ class _SpecReader:
     def _keyframe_positions(self, joints: Sequence[Joint]) -> dict[str, float]:
         """Return the joint positions of the first keyframe that has any."""
         sizes = {"floating": 7, "ball": 4, "fixed": 0}
-        expected = sum(sizes.get(joint.kind, 1) for joint in joints)
-        for key in self._spec.keys:
-            positions = [float(value) for value in key.qpos]
-            if not positions:
-                continue
-            if len(positions) != expected:
-                if self._mjcf.complete:
-                    self._report(
-                        self._node(key),
-                        f"qpos of <key>: got {len(positions)} numbers; expected {expected}; "
-                        "MuJoCo rejects the file",
-                    )
-                return {}
-            return dict(_assign_positions(joints, sizes, positions))
-        return {}
+        moved = [joint for joint in joints for _ in range(sizes.get(joint.kind, 1))]
+        key = next((key for key in self._spec.keys if len(key.qpos)), None)
+        if key is None:
+            return {}
+        if len(key.qpos) != len(moved):
+            if self._mjcf.complete:
+                self._report(
+                    self._node(key),
+                    f"qpos of <key>: got {len(key.qpos)} numbers; expected {len(moved)}; "
+                    "MuJoCo rejects the file",
+                )
+            return {}
+        return {
+            joint.name: float(position)
+            for joint, position in zip(moved, key.qpos, strict=True)
+            if joint.moves and math.isfinite(position)
+        }
 
 
-def _assign_positions(
-    joints: Sequence[Joint], sizes: Mapping[str, int], positions: Sequence[float]
-) -> Iterator[tuple[str, float]]:
-    """Yield the name and position of each joint with one degree of freedom."""
-    at = 0
-    for joint in joints:
-        if joint.moves and math.isfinite(positions[at]):
-            yield joint.name, positions[at]
-        at += sizes.get(joint.kind, 1)
+def _within_limit(actuator: Actuator, limit: float | None) -> Actuator:
+    """Return an actuator whose effort is not more than the limit of its joint."""
+    known = [effort for effort in (actuator.effort, limit) if effort is not None]
+    return replace(actuator, effort=min(known, default=None))
 
 
 def _limit(
@@ -473,20 +441,3 @@ def _limit(
 def _first(node: Node, attributes: Sequence[str]) -> str:
     """Return the first of some attributes that a node has, or an empty string."""
     return next((name for name in attributes if name in node.attributes), "")
-
-
-class _Names:
-    """Set of used names."""
-
-    def __init__(self, used_names: Iterable[str]) -> None:
-        self._used_names = set(used_names)
-        self._counts: dict[str, int] = {}
-
-    def unused(self, name: str) -> str:
-        """Return an unused name and add it to the set."""
-        free = name
-        while free in self._used_names:
-            self._counts[name] = self._counts.get(name, 1) + 1
-            free = f"{name}_{self._counts[name]}"
-        self._used_names.add(free)
-        return free

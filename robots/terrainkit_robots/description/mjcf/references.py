@@ -1,6 +1,7 @@
 """Report references in MJCF to names that do not exist, which MuJoCo's parser accepts."""
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.description.mjcf.shapes import mesh_name
@@ -9,31 +10,10 @@ from terrainkit_robots.description.mjcf.tree import MjcfTree, Node
 if TYPE_CHECKING:
     import mujoco
 
-_NAMED: Mapping[str, str] = {
-    "joint": "joint",
-    "joint1": "joint",
-    "joint2": "joint",
-    "jointinparent": "joint",
-    "body": "body",
-    "body1": "body",
-    "body2": "body",
-    "geom": "geom",
-    "geom1": "geom",
-    "geom2": "geom",
-    "sidesite": "site",
-    "site": "site",
-    "site1": "site",
-    "site2": "site",
-    "cranksite": "site",
-    "slidersite": "site",
-    "refsite": "site",
-    "tendon": "tendon",
-    "tendon1": "tendon",
-    "tendon2": "tendon",
-    "mesh": "mesh",
-    "material": "material",
-}
-"""Kind of element that an attribute refers to."""
+_REFERENCE = re.compile(
+    r"(?:side|crank|slider|ref)?(joint|body|geom|site|tendon|mesh|material)(?:inparent|[12])?"
+)
+"""Attributes that refer to an element, whose kind is in their name."""
 
 _SECTIONS = frozenset({"worldbody", "contact", "tendon", "equality", "actuator", "sensor"})
 
@@ -58,8 +38,9 @@ def dangling_references(tree: MjcfTree, spec: "mujoco.MjSpec") -> None:
     has_ground = len(spec.worldbody.geoms) > 0
     for node in _iter_references(tree, has_ground):
         for attribute, value in node.attributes.items():
-            kind = _NAMED.get(attribute)
-            if kind is None or value in names[kind] or not value:
+            reference = _REFERENCE.fullmatch(attribute)
+            kind = reference[1] if reference else ""
+            if not kind or value in names[kind] or not value:
                 continue
             message = (
                 f"{attribute} of <{node.tag}>: got {value!r}; expected the name of a {kind}; "

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -22,20 +22,14 @@ SIZES: Mapping[ShapeKind, int] = {
 """Number of size parameters of each primitive."""
 
 
+_KINDS: Mapping[str, ShapeKind] = {f"mjGEOM_{kind.upper()}": kind for kind in get_args(ShapeKind)}
+
+
 def shape_kind(shape: Any) -> ShapeKind:
     """Return the kind of a geom or site."""
     import mujoco
 
-    kinds: Mapping[Any, ShapeKind] = {
-        mujoco.mjtGeom.mjGEOM_PLANE: "plane",
-        mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-        mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-        mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-        mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-        mujoco.mjtGeom.mjGEOM_BOX: "box",
-        mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-    }
-    return kinds.get(shape.type, "unknown")
+    return _KINDS.get(mujoco.mjtGeom(shape.type).name, "unknown")
 
 
 _DEFAULT_COLOR = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)

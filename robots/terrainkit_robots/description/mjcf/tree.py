@@ -6,6 +6,7 @@ the tree is written with one element per line, so that a line identifies an elem
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +45,9 @@ _EXCLUDED_ATTRIBUTES = {
 }
 """Attributes that make MuJoCo's parser allocate memory, and do not describe the robot."""
 
+_UNREAD_SECTIONS = ("deformable", "extension", "custom")
+"""Sections whose elements no robot has. Sensors are generated."""
+
 _EXCLUDED_TAGS = frozenset({"flexcomp", "deformable", "skin", "extension"})
 """Elements that are skipped: soft bodies, skins, and plugins that may not be installed."""
 
@@ -81,17 +85,16 @@ class Node:
             if child.tag in ("frame", "replicate"):
                 yield from child.elements()
 
-    def remove(self) -> None:
-        """Remove the node from the tree."""
-        if self.parent is not None:
-            self.parent.children.remove(self)
-            self.parent = None
+    def remove(self) -> bool:
+        """Remove the node from the tree; return False if it is the root."""
+        if self.parent is None:
+            return False
+        self.parent.children.remove(self)
+        self.parent = None
+        return True
 
     default_name: str = ""
     """Generated name of a body that has none."""
-
-    defaults: set[str] = field(default_factory=set)
-    """Attributes that were added for missing required ones."""
 
     @property
     def name(self) -> str:
@@ -112,12 +115,15 @@ class MjcfTree:
     """Trees of a model and of the models that it attaches."""
 
     root: Node
-    attached: dict[str, Node]
+    attached: dict[str, Node] = field(default_factory=dict)
     """Attached models by the file name that `model` elements refer to."""
 
-    problems: list[Problem]
-    sources: tuple[Path, ...]
+    problems: list[Problem] = field(default_factory=list)
+    sources: list[Path] = field(default_factory=list)
     """Every file that was read."""
+
+    unread: Counter[str] = field(default_factory=Counter)
+    """Number of elements of each section that is not read, by tag."""
 
     complete: bool = True
     """Whether the trees contain the whole file; False if elements were skipped."""
@@ -146,13 +152,9 @@ class MjcfTree:
             )
         )
 
-    def roots(self) -> list[Node]:
-        """Return the roots of the model and the attached models."""
-        return [self.root, *self.attached.values()]
-
     def nodes(self) -> Iterator[Node]:
-        """Yield all nodes."""
-        for root in self.roots():
+        """Yield all nodes of the model and the attached models."""
+        for root in (self.root, *self.attached.values()):
             yield from root.walk()
 
     def write(self) -> tuple[str, dict[str, bytes], list[Node]]:
@@ -176,22 +178,20 @@ def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
         doc: The main file; it has a root element.
         contents: File contents by path, which are used instead of the files on disk.
     """
-    reader = _TreeReader(contents)
-    reader.problems += doc.problems
-    root = reader.tree(doc)
-    if root.tag != "mujoco":
-        message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
-        reader.problems.append(Problem(code="XML002", message=message, source=root.source))
-        root.tag = "mujoco"
-    complete = MjcfTree(
-        root=root,
-        attached=reader.attached,
-        problems=reader.problems,
-        sources=tuple(reader.files),
-        complete=reader.complete,
-    )
-    limit_size(complete)
-    return complete
+    root = Node(tag="", source=doc.source(_root(doc)), folder=doc.file.parent)
+    mjcf = MjcfTree(root=root, problems=list(doc.problems))
+    reader = _TreeReader(mjcf, contents)
+    mjcf.root = reader.tree(doc)
+    if mjcf.root.tag != "mujoco":
+        message = f"root element: got <{mjcf.root.tag}>, a part of a model; expected <mujoco>"
+        mjcf.add_problem(mjcf.root, "XML002", message, subject="")
+        mjcf.root.tag = "mujoco"
+    if reader.too_deep:
+        message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
+        mjcf.problems.append(Problem(code="XML011", message=message, source=reader.too_deep[0]))
+        mjcf.complete = False
+    limit_size(mjcf)
+    return mjcf
 
 
 def is_allowed(tag: str, attribute: str = "") -> bool:
@@ -206,46 +206,47 @@ def _excluded_attributes(tag: str) -> set[str]:
 
 
 class _TreeReader:
-    """Read the files of a model and collect their problems."""
+    """Read the files of a model into a tree."""
 
-    def __init__(self, contents: Mapping[Path, bytes]) -> None:
+    def __init__(self, mjcf: MjcfTree, contents: Mapping[Path, bytes]) -> None:
+        self._mjcf = mjcf
         self._contents = contents
         self._bytes = 0
         self._count = 0
         self._unnamed = 0
-        self.files: list[Path] = []
-        self.problems: list[Problem] = []
-        self.attached: dict[str, Node] = {}
-        self.complete = True
-        self._deep = False
+        self.too_deep: list[Source] = []
+        """Elements that are not read, since they are nested too deeply."""
 
     def tree(self, main: XmlDocument, parents: tuple[Path, ...] = ()) -> Node:
         """Return the tree of a model; `parents` are the files of the models that attach it."""
-        assert main.root is not None
-        self.files.append(main.file)
+        self._mjcf.sources.append(main.file)
         folder = main.file.parent
         included: dict[Path, tuple[Path, ...]] = {_real_path(main.file): ()}
-        top = Node(tag="", source=main.source(main.root), folder=folder)
-        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(main.root, main, top, 0)]
+        top = Node(tag="", source=main.source(_root(main)), folder=folder)
+        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(_root(main), main, top, 0)]
         while stack and self._count <= MAX_ELEMENTS:
             element, doc, parent, depth = stack.pop()
             source = doc.source(element)
-            if element.tag == "include":
-                part = self._load_include(element, doc, folder, included)
-                if part is not None and part.root is not None:
-                    inner = reversed(list(part.root.iterchildren(etree.Element)))
-                    stack += [(child, part, parent, depth) for child in inner]
-                continue
             if depth > _MAX_DEPTH:
-                self._report_depth(source)
+                self.too_deep.append(source)
                 continue
-            node = self._node(element, source, parent, folder)
-            if node is None or not self._load_attached(node, (*parents, main.file)):
+            try:
+                if element.tag == "include":
+                    part = self._load_include(element, doc, folder, included)
+                    inner = _root(part).iterchildren(etree.Element, reversed=True)
+                    stack += [(child, part, parent, depth) for child in inner]
+                    continue
+                node = self._node(element, source, parent, folder)
+                if node is not None and node.tag == "model":
+                    self._load_attached(node, (*parents, main.file))
+            except RobotFileError as error:
+                self._report(source, str(error), (element.get("file") or "").strip())
                 continue
-            parent.children.append(node)
-            self._count += 1
-            children = reversed(list(element.iterchildren(etree.Element)))
-            stack += [(child, doc, node, depth + 1) for child in children]
+            if node is not None:
+                parent.children.append(node)
+                self._count += 1
+                children = element.iterchildren(etree.Element, reversed=True)
+                stack += [(child, doc, node, depth + 1) for child in children]
         root = top.children[0]
         root.parent = None
         return root
@@ -266,8 +267,10 @@ class _TreeReader:
         if tag == "body" and not node.name:
             self._unnamed += 1
             node.default_name = f"unnamed_body_{self._unnamed}"
+        if tag in _UNREAD_SECTIONS and len(element):
+            self._mjcf.unread[tag] += len(element)
         if tag in _EXCLUDED_TAGS:
-            self.complete = self.complete and tag != "flexcomp"
+            self._mjcf.complete = self._mjcf.complete and tag != "flexcomp"
             return None
         if tag == "plugin" and parent.tag == "actuator":
             node.tag = "general"  # it acts on a joint like any other actuator
@@ -284,91 +287,84 @@ class _TreeReader:
         doc: XmlDocument,
         folder: Path,
         included: dict[Path, tuple[Path, ...]],
-    ) -> XmlDocument | None:
-        """Return the document of an <include>; None with a problem if it cannot be read."""
-        source, name = doc.source(element), (element.get("file") or "").strip()
+    ) -> XmlDocument:
+        """Return the document of an <include>.
+
+        Raises:
+            RobotFileError: If it cannot be included.
+        """
+        name = (element.get("file") or "").strip()
         chain = (*included[_real_path(doc.file)], _real_path(doc.file))
-        if not name:
-            self._report(source, "<include> has no file", "")
-            return None
         if len(element):
-            self._report(
-                source, f"<include file={name!r}> has children; MuJoCo rejects the file", name
-            )
+            message = f"<include file={name!r}> has children; MuJoCo rejects the file"
+            self._report(doc.source(element), message, name)
         path = folder / name
         sibling = doc.file.parent / name
         if not self._exists(path) and self._exists(sibling):
             path = sibling
-        if _real_path(path) in included:
+        if name and _real_path(path) in included:
             how = "by itself" if _real_path(path) in chain else "twice"
-            self._report(source, f"{name} is included {how}; MuJoCo rejects the file", name)
-            return None
-        part = self._read(path, source, name)
-        if part is not None and part.root is not None:
-            included[_real_path(path)] = chain
-            self.files.append(path)
-            if not len(part.root):
-                self._report(source, f"{name} is empty; expected elements to include", name)
+            raise RobotFileError(f"{name} is included {how}; MuJoCo rejects the file")
+        part = self._read(path, name, "include")
+        included[_real_path(path)] = chain
+        self._mjcf.sources.append(path)
+        if not len(_root(part)):
+            raise RobotFileError(f"{name} is empty; expected elements to include")
         return part
 
     def _exists(self, path: Path) -> bool:
         return path in self._contents or exists(path)
 
-    def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
-        if len(self.files) >= MAX_FILES or self._bytes > MAX_BYTES:
-            self._report(
-                source, f"{name} is not read: too many included files, or too much data", name
-            )
-            return None
+    def _read(self, path: Path, name: str, tag: str) -> XmlDocument:
+        """Return a document with a root that an element names.
+
+        Raises:
+            RobotFileError: If it cannot be read.
+        """
+        if not name:
+            raise RobotFileError(f"<{tag}> has no file")
+        if len(self._mjcf.sources) >= MAX_FILES or self._bytes > MAX_BYTES:
+            raise RobotFileError(f"{name} is not read: too many included files, or too much data")
         try:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
-            self._report(source, f"{name}: {error}", name)
-            self.complete = False
-            return None
+            self._mjcf.complete = False
+            raise RobotFileError(f"{name}: {error}") from None
         self._bytes += len(data)
         part = parse_xml(path, data)
-        self.problems += part.problems
+        self._mjcf.problems += part.problems
         if part.root is None:
-            self._report(source, f"{name} could not be parsed", name)
-            return None
+            raise RobotFileError(f"{name} could not be parsed")
         return part
 
-    def _load_attached(self, node: Node, parents: tuple[Path, ...]) -> bool:
-        """Read the model of a <model> element; return whether the element is kept."""
-        if node.tag != "model":
-            return True
+    def _load_attached(self, node: Node, parents: tuple[Path, ...]) -> None:
+        """Read the model of a <model> element.
+
+        Raises:
+            RobotFileError: If it cannot be attached.
+        """
         name = node.written.get("file", "")
-        if not name:
-            self._report(node.source, "<model> has no file", "")
-            return False
         path = node.folder / name
-        if _real_path(path) in map(_real_path, parents):
-            self._report(node.source, f"{name} attaches itself", name)
-            return False
-        part = self._read(path, node.source, name)
-        if part is None or part.root is None:
-            return False
-        if part.root.tag != "mujoco":
-            message = f"root element of {name}: got <{part.root.tag}>; expected <mujoco>"
-            self._report(node.source, message, name)
-            return False
-        key = f"attached_{len(self.attached)}.xml"
-        self.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
+        if name and _real_path(path) in map(_real_path, parents):
+            raise RobotFileError(f"{name} attaches itself")
+        part = self._read(path, name, "model")
+        tag = _root(part).tag
+        if tag != "mujoco":
+            raise RobotFileError(f"root element of {name}: got <{tag}>; expected <mujoco>")
+        key = f"attached_{len(self._mjcf.attached)}.xml"
+        self._mjcf.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
         node.attributes["file"] = key
-        self.attached[key] = self.tree(part, parents)
-        return True
+        self._mjcf.attached[key] = self.tree(part, parents)
 
     def _report(self, source: Source, message: str, subject: str) -> None:
-        self.problems.append(
+        self._mjcf.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
 
-    def _report_depth(self, source: Source) -> None:
-        if not self._deep:
-            message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
-            self.problems.append(Problem(code="XML011", message=message, source=source))
-        self._deep, self.complete = True, False
+
+def _root(doc: XmlDocument) -> "etree._Element":
+    assert doc.root is not None
+    return doc.root
 
 
 def _prefixed_name(name: str, element: "etree._Element") -> str:
@@ -391,23 +387,18 @@ def _real_path(path: Path) -> Path:
 
 def limit_size(tree: MjcfTree) -> None:
     """Keep the model small: remove replicas or, if that is not enough, everything."""
-    if sum(1 for _ in tree.nodes()) <= MAX_ELEMENTS:
-        if _total_size(tree) <= MAX_ELEMENTS:
-            return
-        replicas = [node for node in tree.nodes() if node.tag == "replicate"]
-        for node in replicas:
-            node.attributes["count"] = "1"
-        if replicas and _total_size(tree) <= MAX_ELEMENTS:
-            _report_size(tree, replicas[0], "replicas are not created")
-            tree.complete = False
-            return
-    _report_size(tree, tree.root, "the model is not read")
-    tree.root.children.clear()
-    tree.attached.clear()
+    if _total_size(tree) <= MAX_ELEMENTS:
+        return
+    replicas = [node for node in tree.nodes() if node.tag == "replicate"]
+    for node in replicas:
+        node.attributes["count"] = "1"
+    if replicas and _total_size(tree) <= MAX_ELEMENTS:
+        node, what = replicas[0], "replicas are not created"
+    else:
+        node, what = tree.root, "the model is not read"
+        tree.root.children.clear()
+        tree.attached.clear()
     tree.complete = False
-
-
-def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
     message = (
         f"number of elements: more than {MAX_ELEMENTS}, long attributes count as several; {what}, "
         "because MuJoCo's parser needs quadratic time"
@@ -416,14 +407,15 @@ def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
 
 
 def _total_size(tree: MjcfTree) -> int:
-    """Return the number of elements after replication, each attached copy counted.
+    """Return the number of elements, or after replication with each attached copy if it is more.
 
     Long attributes count as further elements.
     """
     sizes: dict[str, int] = {}
-    for key in reversed(tree.attached):  # attached models follow the models that name them
-        sizes[key] = _tree_size(tree, tree.attached[key], sizes)
-    return _tree_size(tree, tree.root, sizes)
+    # attached models follow the models that name them
+    for key, root in reversed([("", tree.root), *tree.attached.items()]):
+        sizes[key] = _tree_size(tree, root, sizes)
+    return max(sizes[""], sum(1 for _ in tree.nodes()))
 
 
 def _tree_size(tree: MjcfTree, root: Node, models: Mapping[str, int]) -> int:

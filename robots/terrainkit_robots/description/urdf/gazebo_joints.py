@@ -31,6 +31,8 @@ def gazebo_loops(
         robot: Its links and joints.
     """
     for number, element in enumerate(islice(root.iterfind("gazebo/joint"), MAX_LOOPS), 1):
+        if element.find("parent[@link]") is not None:
+            continue  # a joint of URDF, which is reported as misplaced
         try:
             yield element, _loop(element, number, robot)
         except ConfigError as error:

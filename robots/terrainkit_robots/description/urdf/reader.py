@@ -47,7 +47,6 @@ from terrainkit_robots.description.urdf.colors import (
 )
 from terrainkit_robots.description.urdf.gazebo_joints import gazebo_loops
 from terrainkit_robots.description.urdf.references import invalid_references
-from terrainkit_robots.description.urdf.srdf import invalid_srdf
 from terrainkit_robots.description.urdf.tags import (
     has_variable,
     misspelled_names,
@@ -165,7 +164,6 @@ class _Reader:
             self._report("XML016", element, message)
         if not any(problem.code in ("XML001", "XML004") for problem in self._problems):
             self._problems += invalid_references(self._doc)
-            self._problems += invalid_srdf(self._doc)
 
     # Numbers
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Reference(NamedTuple):
-    """A name in an element that refers to a link, a joint or a group."""
+    """A name in an element that refers to a link or a joint."""
 
     element: "etree._Element"
     """The element."""
@@ -27,7 +27,7 @@ class Reference(NamedTuple):
     """Where the name is, for messages."""
 
     kind: str
-    """What it names: `link`, `joint`, `link or joint`, or `group`."""
+    """What it names: `link`, `joint` or `link or joint`."""
 
     name: str
     """The name."""
@@ -55,8 +55,11 @@ def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
     They are names of no link or joint, joints with two transmissions, and invalid ratios.
     """
     assert doc.root is not None
-    joints = joint_names(doc.root)
-    yield from _unknown_names(doc, link_names(doc.root), joints)
+    links, joints = (
+        {element.get("name", "") for element in doc.root.iterchildren(tag)}
+        for tag in ("link", "joint")
+    )
+    yield from _unknown_names(doc, links, joints)
     yield from _repeated_transmissions(doc, joints)
     yield from _invalid_reductions(doc)
 
@@ -87,16 +90,6 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
             subject=name,
         )
     yield from found.values()
-
-
-def link_names(root: "etree._Element") -> set[str]:
-    """Return the names of the links."""
-    return {link.get("name", "") for link in root.iterchildren("link")}
-
-
-def joint_names(root: "etree._Element") -> set[str]:
-    """Return the names of the joints."""
-    return {joint.get("name", "") for joint in root.iterchildren("joint")}
 
 
 def _references(root: "etree._Element") -> Iterator[Reference]:

@@ -135,7 +135,7 @@ class _Simplifier:
                 if replacements is None
                 else [_replace_shape(shape, replacement) for replacement in replacements]
             )
-        return replace(link, collisions=tuple(_unique_names(found)))
+        return replace(link, collisions=tuple(found))
 
     def _replacement(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
         """Return the replacement in the frame of a mesh, its description, and its volume [m3]."""
@@ -209,13 +209,3 @@ def _replace_shape(shape: Geometry, other: Geometry) -> Geometry:
         origin=shape.origin @ other.origin,
         fit_to_mesh=False,
     )
-
-
-def _unique_names(shapes: Iterable[Geometry]) -> Iterable[Geometry]:
-    """Yield geometries with unique names."""
-    counts: dict[str, int] = {}
-    for shape in shapes:
-        count = counts[shape.name] = counts.get(shape.name, 0) + 1
-        yield (
-            shape if count == 1 or not shape.name else replace(shape, name=f"{shape.name}_{count}")
-        )

@@ -1,11 +1,11 @@
 """Compare the link poses of two descriptions of a robot.
 
-Both robots are set to the same random joint positions. yourdfpy computes the link poses of a URDF
-from the file. The frames of an MJCF are compiled by MuJoCo when it is read, and moved by our
-kinematics.
+Both robots are set to the same random joint positions, and moved by our kinematics. The frames of
+an MJCF are compiled by MuJoCo when it is read.
 """
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
@@ -16,7 +16,6 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, pair_robots
-from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
 
 MAX_DISTANCE, MAX_ANGLE = 1e-3, math.radians(0.1)
@@ -85,14 +84,14 @@ def compare_link_poses(
     one of the robots has are at 0.
 
     Args:
-        robot: A robot whose file still exists.
+        robot: A robot.
         other: Another description of the robot.
         poses: Number of poses.
         seed: Seed of the poses.
         locked: Names of joints of `robot` that stay at 0.
 
     Raises:
-        CannotCheckError: if no links match, or the poses of a robot cannot be computed.
+        CannotCheckError: if no links match, joint names repeat, or poses are not finite.
     """
     pairs = pair_robots(robot, other)
     if pairs is None or len(pairs.links) < 2:
@@ -136,8 +135,9 @@ def _bounds(joint: Joint, other: Joint) -> tuple[float, float]:
 
 
 def _link_poses(robot: Facts, positions: Mapping[str, Matrix], count: int) -> dict[str, Matrix]:
-    if robot.model.kind != "mjcf":
-        return urdf_poses(robot, positions)
+    for name, times in Counter(joint.name for joint in robot.joints).items():
+        if times > 1:
+            raise CannotCheckError(f"{robot.model.file.name} has {times} joints called {name}")
     # The positions of mimic joints are given: both robots get the positions of the first.
     free = [
         replace(body, joint=None if body.joint is None else replace(body.joint, mimic=None))

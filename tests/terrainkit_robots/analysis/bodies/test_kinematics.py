@@ -1,12 +1,14 @@
 import mujoco
 import numpy as np
 import pytest
+import yourdfpy
 
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.link_poses import link_poses, random_positions
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from tests.robots import ROBOTS
 from tests.small_robots import facts, joint, link
 
 COUNT = 5
@@ -162,3 +164,22 @@ def test_link_poses_of_other_joints_are_at_zero():
     assert list(poses) == list(expected)
     for name, pose in expected.items():
         np.testing.assert_array_equal(poses[name], [pose] * 3)
+
+
+# Compared with yourdfpy
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name.endswith(".urdf")])
+def test_link_poses_match_yourdfpy(robot_file, name):
+    path = robot_file(name)
+    robot = Facts(load_robot(path))
+    model = yourdfpy.URDF.load(str(path), load_meshes=False)
+    ranges = {each.name: each.range or (-3.0, 3.0) for each in robot.joints}
+    positions = random_positions(ranges, robot.joints, count=COUNT, seed=0)
+    ours = link_poses(robot.bodies, positions, count=COUNT)
+    top = robot.bodies[0].top.name
+    for k in range(COUNT):
+        model.update_cfg({each: values[k] for each, values in positions.items()})
+        for link_name, poses in ours.items():
+            expected = model.get_transform(link_name, top)
+            np.testing.assert_allclose(poses[k], expected, atol=1e-9, err_msg=link_name)

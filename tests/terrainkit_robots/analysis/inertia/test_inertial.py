@@ -4,8 +4,8 @@ import pytest
 from terrainkit_robots.analysis.inertia.inertial import (
     bodies_with_mass,
     has_valid_mass,
-    inertia_source,
-    mass_source,
+    inertia_part,
+    mass_part,
     max_inertia,
 )
 from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia, parallel_axis
@@ -25,7 +25,7 @@ def test_sources_and_elements_of_an_inertia():
     with_inertial, bare = facts(text, link("b", mass=None)).model.links
     for each, maximum, lines in ((with_inertial, 5, (2, 3)), (bare, 0, (3, 3))):
         assert max_inertia(each) == maximum
-        assert (mass_source(each).line, inertia_source(each).line) == lines
+        assert (mass_part(each).source.line, inertia_part(each).source.line) == lines
 
 
 def part(mass, place, moments=None):

@@ -212,9 +212,7 @@ BALL, DRAWN, SHANK = ball(0.02), ball(0.02, kind="visual"), box("0.04 0.04 0.1",
         ("", [("drawn", -0.2, DRAWN), ("pad", -0.2, BALL)], "pad"),
         ("", [("end", -0.2, "")], "end"),
         (SHANK, [("foot", -0.15, DRAWN)], "foot"),
-        # The contact is 0.15 m below the knee, and a foot within half of that and 1 cm.
-        (SHANK, [("x", -0.066, DRAWN)], "x"),
-        (SHANK, [("x", -0.064, DRAWN)], "b"),
+        (SHANK, [("x", -0.15, DRAWN)], "b"),
     ],
 )
 def test_foot_of_a_leg(shank, ends, foot):
@@ -270,6 +268,32 @@ def test_leg_with_prismatic_joint():
     assert set(robot.stance.positions.values()) == {0.0}  # nothing to bend
 
 
+def test_radial_legs_may_be_copies_that_are_no_mirror_images():
+    # Each leg is turned by 20 degrees from the radius, and its foot is above the belly.
+    parts = [link("trunk", box("0.2 0.2 0.1"), mass=5)]
+    for k in range(6):
+        x, y = 0.1 * math.cos(math.pi * k / 3), 0.1 * math.sin(math.pi * k / 3)
+        turn = math.pi * k / 3 + 0.35
+        parts += [link(f"a{k}"), link(f"b{k}"), link(f"c{k}", ball(0.01, "0.1 0 0.02"))]
+        parts += [joint("trunk", f"a{k}", f"{x} {y} 0", "0 0 1", rpy=f"0 0 {turn}")]
+        parts += [joint(f"a{k}", f"b{k}"), joint(f"b{k}", f"c{k}", "0.1 0 0")]
+    assert [leg.foot for leg in facts(*parts).legs] == [f"c{k}" for k in range(6)]
+    # Of three such limbs, one is an arm as likely as a leg.
+    assert facts(*parts[:1], *parts[1:7], *parts[13:19], *parts[25:31]).legs == ()
+
+
+def test_foot_that_carries_rods_ends_the_leg():
+    rods = [
+        link(f"{n}_{k}", ball(0.01, "0 0 0.1")) + joint(f"{n}1", f"{n}_{k}", f"{x} 0 -0.2")
+        for n in "ab"
+        for k, x in (("front", 0.05), ("rear", -0.05))
+    ]
+    legs = [chain("a", "0 0.2 0", (0.3, 0.3)), chain("b", "0 -0.2 0", (0.3, 0.3))]
+    robot = facts(TRUNK, *legs, *rods)
+    assert [leg.foot for leg in robot.legs] == ["a1", "b1"]
+    assert {robot.bodies[limb.chain[-1]].name for limb in robot.limbs} == {"a1", "b1"}
+
+
 def test_legs_of_eight_legged_spider():
     # Radial legs, each of which bends about its own horizontal axis.
     parts = [TRUNK]
@@ -284,8 +308,8 @@ def test_legs_of_eight_legged_spider():
     assert robot.stance.margin > 0.09
 
 
-# Legs of 0.2 m, stretched sideways at zero; a quarter of them is 0.05 m.
-@pytest.mark.parametrize(("belly", "count"), [(0.049, 4), (0.051, 0)])
+# Legs of 0.2 m, stretched sideways at zero: they reach as far below the hips.
+@pytest.mark.parametrize(("belly", "count"), [(0.199, 4), (0.201, 0)])
 def test_legs_that_are_stretched_sideways_at_zero(belly, count):
     parts = [link("trunk", box("0.4 0.2 0.02", f"0 0 {0.01 - belly}"), mass=5)]
     for name, x, y in (("a", 0.2, 1), ("b", 0.2, -1), ("c", -0.2, 1), ("d", -0.2, -1)):

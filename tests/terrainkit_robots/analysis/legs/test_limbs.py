@@ -111,7 +111,7 @@ LEFT = chain("a", "0 0.2 0", LENGTHS)
         (at_corners("x", "y"), {"x1": 1.5, "y1": 1.5}),
         (at_corners("x", "-", "z")[::2], {"x1": 1.5, "z1": 1.5}),
         (ARMS, {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 1.5, "w_arm1": 1.5}),
-        (SPARE, dict.fromkeys(("x1", "y1", "z1", "w1"), 1.5) | {"arm_l1": 0.0}),
+        (SPARE, dict.fromkeys(("x1", "y1", "z1", "w1"), 1.5) | {"arm_l1": 0.5}),
         (ARMS[2:], {"z_arm1": 0.5, "w_arm1": 0.5}),
         ([LEFT, chain("b", "0 -0.2 0", (0.2,) * 3)], {"a1": 1.5, "b2": 1.5}),
         ([LEFT, chain("b", "0 -0.2 0", (0.15,) * 4)], {"a1": 1.0, "b3": 1.0}),

@@ -37,17 +37,15 @@ def body_at_axis(form='cylinder radius="0.1" length="0.05"', center="0 0 0", rpy
         (body_at_axis(), {}, "wheel"),
         (body_at_axis('sphere radius="0.1"'), {}, "wheel"),
         (body_at_axis(), {"kind": "revolute", "limits": (-1e16, 1e16)}, "wheel"),
-        (body_at_axis(), {"kind": "revolute", "limits": (-6.29, 6.29)}, "wheel"),  # over two turns
-        (body_at_axis(), {"kind": "revolute", "limits": (-6.28, 6.28)}, "ankle"),
+        (body_at_axis(), {"kind": "revolute", "limits": (-3.11, 3.11)}, "wheel"),  # a whole turn
+        (body_at_axis(), {"kind": "revolute", "limits": (-3.09, 3.09)}, "ankle"),
         (body_at_axis(center="0 0 -0.05"), {}, "ankle"),  # the center of a foot below its ankle
         (body_at_axis('box size="0.2 0.1 0.04"', rpy="0 0 0"), {}, "ankle"),
         (body_at_axis('box size="0.1 0.05 0.1"', rpy="0 0 0"), {}, "ankle"),  # radii of 1 to 1.41
         (body_at_axis(rpy="0 0 0"), {}, "ankle"),  # a cylinder across the axis
         (link("END", inertia=ROUND), {}, "ankle"),  # without shapes
         (body_at_axis(center="0 0.5 0"), {}, "wheel"),  # along the axis
-        # The radius of gyration is sqrt(0.03 / 2) = 0.1225 m, and a quarter of it 0.0306 m.
-        (link("END", ball(0.02), center="0.0305 0 0", inertia=HEAVY), {}, "wheel"),
-        (link("END", ball(0.02), center="0.0307 0 0", inertia=HEAVY), {}, "ankle"),
+        (link("END", ball(0.02), center="0.1 0 0", inertia=HEAVY), {}, "wheel"),  # and its motor
         # Off the axis by a ninth of its radius, a ball has radii of 10/9 to 8/9: 1.25.
         (link("END", ball(0.02, "0 0 0.0022"), inertia=HEAVY), {}, "wheel"),
         (link("END", ball(0.02, "0 0 0.0023"), inertia=HEAVY), {}, "ankle"),
@@ -56,6 +54,27 @@ def body_at_axis(form='cylinder radius="0.1" length="0.05"', center="0 0 0", rpy
 def test_wheel_is_round_and_turns_without_limits(end, hinge, role):
     legs = facts(wheel_legs(FOUR, end, **hinge)).legs
     assert {leg.roles[-1] for leg in legs} == {role}
+
+
+def test_one_motor_bends_a_leg_of_four_bars_with_a_wheel():
+    side = """<body name="SIDE_thigh" pos="0 Y 0.5"><joint name="SIDE_hip" axis="0 1 0"/>
+      <geom size="0.03" fromto="0 0 0 0 0 -0.2" type="capsule"/>
+      <body name="SIDE_shank" pos="0 0 -0.2"><joint name="SIDE_knee" axis="0 1 0"/>
+        <geom size="0.03" fromto="0 0 0 0 0 -0.2" type="capsule"/>
+        <body name="SIDE_rod" pos="0.1 0 0"><joint name="SIDE_rod" axis="0 1 0"/>
+          <geom size="0.01" fromto="0 0 0 0 0 0.2" type="capsule"/></body>
+        <body name="SIDE_end" pos="0 0 -0.2"><joint name="SIDE_axle" axis="0 1 0"/>
+          <geom type="cylinder" size="0.1 0.02" euler="90 0 0"/></body></body></body>"""
+    sides = [
+        side.replace("SIDE", name).replace("Y", y) for name, y in (("p", "0.2"), ("q", "-0.2"))
+    ]
+    motors = "".join(f'<motor joint="{n}_{j}"/>' for n in "pq" for j in ("hip", "axle"))
+    loops = "".join(f'<connect body1="{n}_rod" body2="trunk" anchor="0 0 0.2"/>' for n in "pq")
+    text = f"""<mujoco><worldbody><body name="trunk"><freejoint/><geom type="box"
+      size="0.2 0.15 0.05" pos="0 0 0.5"/>{"".join(sides)}</body></worldbody>
+      <equality>LOOPS</equality><actuator>{motors}</actuator></mujoco>"""
+    assert [leg.foot for leg in facts(text.replace("LOOPS", loops)).legs] == ["p_end", "q_end"]
+    assert facts(text.replace("LOOPS", "")).legs == ()  # a trailing arm of a car
 
 
 def test_pose_of_legs_with_wheels_about_x():

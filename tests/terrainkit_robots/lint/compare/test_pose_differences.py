@@ -4,52 +4,12 @@ import math
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.bodies.link_poses import link_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.compare.pose_differences import compare_link_poses, sample_positions
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
-from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
-from tests.small_robots import facts, joint, link
 from tests.tables import read_table
 
 ARM = read_table(__file__, "arm")
-
-
-def worst(robot, count=5):
-    """Return the largest difference between our link poses and yourdfpy's."""
-    pairs = pair_robots(robot, robot)
-    positions, _ = sample_positions(pairs, poses=count, seed=1)
-    ours = link_poses(robot.bodies, positions, count=count)
-    theirs = urdf_poses(robot, positions)
-    top = theirs[robot.bodies[0].top.name]
-    return max(np.abs(top @ poses - theirs[name]).max() for name, poses in ours.items())
-
-
-@pytest.mark.parametrize("name", ["quadruped.urdf", "biped.urdf"])
-def test_body_poses_agree_with_yourdfpy(robot_of, name):
-    assert worst(robot_of(name)) < 1e-9
-
-
-@pytest.mark.parametrize("kind", ["urdf", "xacro"])  # the angles of xacro are written again
-@pytest.mark.parametrize(
-    "origin",
-    [
-        'rpy="0.2 -0.3 0.4"',
-        'quat_xyzw="0.1 0.2 0.3 0.9"',
-        *(f'rpy="0.2 {math.pi / 2 - off!r} 0.4"' for off in (0.0, 1e-10, 9e-10, 1e-8)),
-    ],
-)
-def test_body_poses_of_an_arm_agree_with_yourdfpy(tmp_path, kind, origin):
-    path = tmp_path / f"arm.{kind}"
-    path.write_text(ARM.replace('rpy="0.2 -0.3 0.4"', origin))
-    robot = Facts(load_robot(path))
-    assert robot.model.kind == kind
-    assert worst(robot) < 1e-11
-
-
-# Differences
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
@@ -175,31 +135,12 @@ def test_urdf_with_errors_is_compared(robot_of, caplog, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_changed_urdf_cannot_be_compared(robot_of):
-    robot = robot_of(ARM)
-    file = robot.model.file
-    for text in (ARM.replace("turn", "bend"), ""):
-        file.write_text(text)
-        with pytest.raises(CannotCheckError, match="has changed"):
-            compare_link_poses(robot, robot)
-    file.unlink()
-    with pytest.raises(CannotCheckError, match="there is no file"):
-        compare_link_poses(robot, robot)
-
-
 def test_robots_without_common_links_cannot_be_compared(robot_of):
     other = robot_of(ARM.replace('link name="', 'link name="x').replace('link="', 'link="x'))
     assert compare_link_poses(robot_of(ARM), other).is_within_tolerance
     none = robot_of(ARM.replace('name="', 'name="x').replace('link="', 'link="x'))
     with pytest.raises(CannotCheckError, match="no links"):
         compare_link_poses(robot_of(ARM), none)
-
-
-def test_large_robot_cannot_be_compared():
-    links = [link(f"l{k}", mass=None) for k in range(2001)]
-    robot = facts(*links, *(joint(f"l{k}", f"l{k + 1}", kind="continuous") for k in range(2000)))
-    with pytest.raises(CannotCheckError, match="2000 joints"):
-        compare_link_poses(robot, robot)
 
 
 def test_extreme_numbers_are_compared(robot_of):
@@ -209,5 +150,5 @@ def test_extreme_numbers_are_compared(robot_of):
 
 def test_duplicate_joint_names_cannot_be_compared(robot_of):
     robot = robot_of(ARM.replace('"slide"', '"turn"'))
-    with pytest.raises(CannotCheckError, match="two joints called turn"):
+    with pytest.raises(CannotCheckError, match="2 joints called turn"):
         compare_link_poses(robot, robot)

@@ -10,7 +10,7 @@ from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
 
 # Of 536 published files, 15 have a warning and 3 an error, 12 to 35 cm outside, all with real
-# defects (docs/check_robot_precision.md).
+# defects (benchmarks/results/check_robot_precision.md).
 _COM_SHARE, _COM_MARGIN, _COM_ERROR = 0.10, 0.005, 3.0
 """Allowed distance of a center of mass from the bounding box of its body: a fraction of the
 diagonal plus a margin [m]. The last value is the multiple of that distance that is an error."""

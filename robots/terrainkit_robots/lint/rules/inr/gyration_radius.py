@@ -26,7 +26,7 @@ from terrainkit_robots.lint.rule import Severity, Violation, Violations, finding
 from terrainkit_robots.transforms import Matrix
 
 # Of 536 published files, 58 exceed the first limit, all with real defects, and 38 the second, 6 of
-# them on purpose (docs/check_robot_precision.md).
+# them on purpose (benchmarks/results/check_robot_precision.md).
 _MAX_GYRATION, _MAX_GYRATION_ERROR = 1.05, 3.0
 """Radius of gyration divided by half the diagonal of the body: limits of the warning and the error.
 Mass inside a box cannot exceed 1; the margin is for shapes that omit a small part of the body."""

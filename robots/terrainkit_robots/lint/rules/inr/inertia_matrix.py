@@ -22,7 +22,7 @@ from terrainkit_robots.text import names, numbers
 from terrainkit_robots.transforms import Matrix
 
 # Of 536 published files, 33 are below it, and 7 between it and the next limit; MuJoCo rejects all
-# of them (docs/check_robot_precision.md).
+# of them (benchmarks/results/check_robot_precision.md).
 _MIN_TRIANGLE_RATIO = 0.99
 """Ratio (I1 + I2) / I3 of the principal moments below which rounding cannot explain the
 violation."""

@@ -50,8 +50,9 @@ def detected_legs(robot: Facts) -> Violations:
         No action if the legs are correct. If a leg is missing, check its joints and its last link.
 
     Source:
-        Leaves of the tree that end near the ground and have a mirror image, or names of legs. Limbs
-        with other names, such as arms, are legs only if the robot does not stand without them.
+        Ends of the tree that are near the ground and have a mirror image, or names of legs, and
+        four or more equal limbs around the robot that reach the ground. Limbs with other names,
+        such as arms, are legs only if the robot does not stand without them.
     """
     roles = {leg.foot: " ".join(leg.roles) for leg in robot.legs}
     if len(set(roles.values())) == 1:

@@ -1,4 +1,4 @@
-"""Rules that load the file with MuJoCo and yourdfpy."""
+"""Rule that loads the file with MuJoCo."""
 
 import re
 from itertools import islice
@@ -77,22 +77,22 @@ def mujoco_load_failure(robot: Facts) -> Violations:
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
         LoadError,
-        NotAttemptedError,
         mujoco_load_error,
     )
 
-    _require_saved(robot)
+    if any(robot.meshes.has_contents(path) for path in robot.model.sources):
+        raise CannotCheckError("the file has fixes that are not written yet")
     refusals: list[LoadError | None] = []
     reason = ""
     try:
         refusals.append(mujoco_load_error(robot.model))
-    except NotAttemptedError as error:
+    except CannotCheckError as error:
         reason = str(error)
     is_mesh_error = any(refusal and re.search(_MESH_ERROR, refusal.message) for refusal in refusals)
     if (reason or is_mesh_error) and robot.model.kind == "urdf":
         try:
             refusals.append(mujoco_load_error(robot.model, with_meshes=False))
-        except NotAttemptedError as error:
+        except CannotCheckError as error:
             reason = reason or str(error)
     if not refusals:
         raise CannotCheckError(reason)
@@ -104,9 +104,7 @@ def mujoco_load_failure(robot: Facts) -> Violations:
             is_explained = severity == "error" or code == "MSH003"
             if "not found in" in refusal.message and _is_included(robot.model.file):
                 is_explained = True
-            yield _load_failure(
-                robot, "MuJoCo", refusal, code, severity="note" if is_explained else "error"
-            )
+            yield _load_failure(robot, refusal, code, "note" if is_explained else "error")
 
 
 def _is_included(file: Path) -> bool:
@@ -115,41 +113,6 @@ def _is_included(file: Path) -> bool:
     others = (path for path in islice(file.parent.glob("*.xml"), _MAX_SIBLINGS) if path != file)
     small = (path for path in others if path.is_file() and path.stat().st_size < _MAX_BYTES)
     return any(include.search(path.read_bytes()) for path in small)
-
-
-@rule("SIM005", "yourdfpy-load-failure", "note", needs=("simulation",))
-def yourdfpy_load_failure(robot: Facts) -> Violations:
-    """The library yourdfpy cannot load the unmodified file.
-
-    Python tools for retargeting, planning and visualization load URDF with yourdfpy. It is only
-    tried on files with XML problems, since importing it takes longer than all other rules.
-
-    Fix:
-        Correct the reported element. The message is from yourdfpy.
-
-    Source:
-        The file is loaded with the installed version of yourdfpy, without meshes.
-    """
-    from terrainkit_robots.analysis.simulator_conventions.loading import (
-        NotAttemptedError,
-        yourdfpy_load_error,
-    )
-
-    if robot.model.kind == "mjcf" or not robot.model.problems:
-        return
-    _require_saved(robot)
-    try:
-        refusal = yourdfpy_load_error(robot.model, robot.tree)
-    except NotAttemptedError as reason:
-        raise CannotCheckError(str(reason)) from None
-    if refusal is not None:
-        yield _load_failure(robot, "yourdfpy", refusal, "", severity="note")
-
-
-def _require_saved(robot: Facts) -> None:
-    """Raise an error if the file has unsaved fixes: both libraries read it from disk."""
-    if any(robot.meshes.has_contents(path) for path in robot.model.sources):
-        raise CannotCheckError("the file has fixes that are not written yet")
 
 
 def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
@@ -176,9 +139,7 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     return best
 
 
-def _load_failure(
-    robot: Facts, loader: str, refusal: "LoadError", code: str, *, severity: Severity
-) -> Violation:
+def _load_failure(robot: Facts, refusal: "LoadError", code: str, severity: Severity) -> Violation:
     parts: tuple[Element, ...] = (*robot.model.joints, *robot.model.links)
     elements = {part.name: part for part in parts if part.name}
     source = robot.model.source
@@ -187,7 +148,7 @@ def _load_failure(
     suffix = f" ({names([refusal.element])})" if refusal.element else ""
     return Violation(
         element=elements.get(refusal.element) or Part(robot.model.title, source),
-        message=f"{loader} cannot load the file: {truncate(refusal.message, 200)}{suffix}",
+        message=f"MuJoCo cannot load the file: {truncate(refusal.message, 200)}{suffix}",
         hint=f"See rule {code}." if code else "",
         severity=severity,
     )

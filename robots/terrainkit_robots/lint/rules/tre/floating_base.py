@@ -33,12 +33,12 @@ def no_free_joint(robot: Facts) -> Violations:
         return
     root = tree.links[tree.order[0]]
     if any(
-        joint.parent == WORLD and joint.child == root.name and joint.kind != "fixed"
+        joint.parent == WORLD and root.name in (WORLD, joint.child) and joint.kind != "fixed"
         for joint in model.joints
     ):
         return
     edit = InsertChild(source=root.source, xml="<freejoint/>")
-    edits = [] if model.keyframe else [edit]
+    edits = [] if model.keyframe or root.virtual else [edit]
     yield Violation(
         element=root,
         message=f"body {root.name}: is welded to the world, but the robot has {len(robot.legs)} "

@@ -45,17 +45,16 @@ def duplicate_name(robot: Facts) -> Violations:
 
 @rule("TRE010", "invalid-reference", "warning")
 def invalid_reference(robot: Facts) -> None:
-    """A tag for another tool, or the SRDF, names a link or joint that does not exist.
+    """A tag for another tool names a link or joint that does not exist.
 
-    The names in <gazebo>, <transmission>, <sensor>, <ros2_control> and the SRDF were not changed
-    when a link or joint was renamed, removed or copied. A sensor, the friction of a foot or a motor
-    is then missing in that tool, or its controllers do not start. Two simple transmissions of the
-    same joint are also reported, since another joint then has none.
+    The names in <gazebo>, <transmission>, <sensor> and <ros2_control> were not changed when a link
+    or joint was renamed, removed or copied. A sensor, the friction of a foot or a motor is then
+    missing in that tool, or its controllers do not start. Two simple transmissions of the same
+    joint are also reported, since another joint then has none.
 
     Fix:
         Correct the name, or remove the element.
 
     Source:
-        wiki.ros.org/urdf/XML: gazebo, transmission and sensor; wiki.ros.org/srdf. An SRDF belongs
-        to the URDF of the same file name, beside it or in srdf/ or config/ of the package.
+        wiki.ros.org/urdf/XML: gazebo, transmission and sensor.
     """

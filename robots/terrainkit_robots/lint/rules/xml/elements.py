@@ -122,16 +122,16 @@ def undefined_material(robot: Facts) -> None:
 def unsupported_quaternion(robot: Facts) -> None:
     """A rotation is given as a quaternion, which simulators ignore.
 
-    URDF 1.1 introduced `quat_xyzw`. MuJoCo and yourdfpy silently ignore it, so links and joints
-    have another orientation than in the tool that wrote the file. Readers of URDF 1.0 ignore it
-    as well, or reject the file because of its version.
+    URDF 1.1 introduced `quat_xyzw`. MuJoCo silently ignores it, so links and joints have another
+    orientation than in the tool that wrote the file. Readers of URDF 1.0 ignore it as well, or
+    reject the file because of its version.
 
     Fix:
         Write the same rotation as `rpy`; the file can then be version 1.0. `terrainkit onboard`
         converts it, too.
 
     Source:
-        Pull requests 194 and 235 of urdfdom; MuJoCo 4.0 and yourdfpy 0.0.60 ignore it.
+        Pull requests 194 and 235 of urdfdom; MuJoCo 4.0 ignores it.
     """
 
 

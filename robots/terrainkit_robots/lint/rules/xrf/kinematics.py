@@ -23,8 +23,7 @@ def compare_kinematics(robot: Facts) -> Violations:
         Compare the origin of the joint of the first link that differs.
 
     Source:
-        Both robots are compared in 20 random poses. yourdfpy computes the link poses of a URDF, and
-        MuJoCo compiles the frames of an MJCF.
+        Both robots are compared in 20 random poses. MuJoCo compiles the frames of an MJCF.
     """
     from terrainkit_robots.lint.compare.pose_differences import compare_link_poses
 

@@ -1,6 +1,5 @@
 import pytest
 
-from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.canonical import to_canonical
 from tests.terrainkit_robots.export.made_models import MJCF_MASS
 
@@ -49,15 +48,25 @@ def test_robot_with_base_is_unchanged(base, motors, robot):
     """A fixed arm is a base if it alone has an actuator."""
     left, motor = '<body name="left" pos="-1 0 0">', '<motor joint="right_joint"/>'
     text = ARMS.replace(left, left + base).replace(motor, motor * (motors - 1))
-    facts = robot(text)
-    assert with_world_base(facts) is facts
+    assert "world" not in robot(text).tree.links
 
 
 def test_base_is_free_only_on_request(robot):
     facts = robot(WALKER)
-    assert with_world_base(facts).model.floating is False
-    free = with_world_base(facts, floating=True)
+    assert (facts.model.floating, facts.bodies[0].top.name) == (False, "world")
+    free = facts.with_free_base()
     assert (free.model.floating, free.bodies[0].top.name) == (True, "torso")
     parents = {joint.name: joint.parent for joint in free.model.joints}
     assert parents == dict.fromkeys(("z", "x", "turn"), "world") | {"elbow": "torso"}
-    assert with_world_base(free, floating=True) is free
+    assert free.with_free_base() is free
+
+
+def test_legs_of_a_trunk_in_the_world(robot):
+    leg = f"""<body name="{{0}}" pos="0 {{1}} 0"><joint name="{{0}}_hip" axis="0 1 0"/>
+      <geom size="0.02" fromto="0 0 0 0 0 -0.3" type="capsule"/><body name="{{0}}_foot"
+      pos="0 0 -0.3">{MJCF_MASS}<joint name="{{0}}_knee" axis="0 1 0"/>
+      <geom size="0.02" pos="0 0 -0.3"/></body></body>"""
+    motors = "".join(f'<motor joint="{n}_{j}"/>' for n in ("a", "b") for j in ("hip", "knee"))
+    text = f"""<mujoco><worldbody><geom type="box" size="0.1 0.1 0.1"/>{leg.format("a", 0.2)}
+      {leg.format("b", -0.2)}</worldbody><actuator>{motors}</actuator></mujoco>"""
+    assert [leg.foot for leg in robot(text).legs] == ["a_foot", "b_foot"]
