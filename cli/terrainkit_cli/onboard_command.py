@@ -55,6 +55,10 @@ class Onboard(Command):
     """Also write the configuration files of a training framework: legged_gym, leggedgym_ex,
     isaaclab, mjlab, genesis."""
 
+    map: InputPath | None = None
+    """For --config leggedgym_ex: train on this map (.npz), with its terrain, a curriculum, measured
+    heights and the rewards for rough terrain. Genesis requires a map without solids there."""
+
     name: Annotated[str, option("NAME")] = ""
     """Name of the robot, of its tasks in training frameworks and of their packages, such as
     my_robot; by default the robot's name in the file."""
@@ -135,6 +139,7 @@ class Onboard(Command):
         return OnboardOptions(
             settings=parse_settings(self.ignore, self.package, self.xacro_arg, self.feet),
             collision=self.collision,
+            map=self.map,
             name=self.name,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],

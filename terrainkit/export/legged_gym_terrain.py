@@ -20,12 +20,10 @@ DATA_FILE = str(Path(__file__).absolute().with_suffix(".npz"))
 
 
 class Terrain:
-    """The terrain of an environment.
-
-    The layout and the friction of the map are written into `cfg`.
+    """The terrain of an environment, which writes its layout and its friction into `cfg`.
 
     Args:
-        cfg: `cfg.terrain` of the environment; `mesh_type` is trimesh or heightfield.
+        cfg: `cfg.terrain` of the environment. With `mesh_type` plane or none, nothing is written.
         num_robots: Number of environments; not used.
 
     Raises:
@@ -34,12 +32,14 @@ class Terrain:
     """
 
     def __init__(self, cfg: Any, num_robots: Any = None) -> None:
-        data = load()
+        self.cfg, self.num_robots, self.type = cfg, num_robots, cfg.mesh_type
+        if cfg.mesh_type in ("plane", "none"):
+            return  # as in the class that this one replaces
         if cfg.mesh_type not in ("trimesh", "heightfield"):
             raise ValueError(f"mesh_type: got {cfg.mesh_type}; expected trimesh or heightfield")
+        data = load()
         if cfg.mesh_type == "heightfield":
             _require_no_solids(data)
-        self.cfg, self.num_robots, self.type = cfg, num_robots, cfg.mesh_type
         self.env_origins, self.terrain_type = data["env_origins"], data["terrain_type"]
         _update_cfg(cfg, data)
         self.env_length, self.env_width = cfg.terrain_length, cfg.terrain_width

@@ -2,8 +2,10 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from tests.robots import ARM
 from tests.tables import read_table
@@ -48,6 +50,23 @@ def test_onboard_name_is_that_of_the_task(here, tmp_path):
     (tmp_path / "quad/quad.py").write_text("# Mine.\n")
     assert here(*words, "--overwrite")[0] == 0
     assert (tmp_path / "quad/quad.py.before").read_text() == "# Mine.\n"
+
+
+def test_onboard_for_a_map(here, tmp_path, terrain_map):
+    terrain_map.save(tmp_path / "map.npz")
+    words = ("quadruped", "--name", "quad", NO_PICTURES, "--config", "leggedgym_ex", "--map")
+    code, out, err = here(*words, "map.npz")
+    assert (code, err) == (0, "")
+    assert "quad_config.py, quad.py, __init__.py, terrain.py, terrain.npz\n" in out
+    assert '"heightfield" if' in (tmp_path / "quad/quad_config.py").read_text()
+    with np.load(tmp_path / "quad/terrain.npz") as arrays:
+        assert arrays["env_origins"].shape == (2, 3, 3)
+    config = MapConfig(rows=1, cols=1, terrains=(SubTerrain(terrain="crawl"),))
+    solid_map = generate(config)
+    solid_map.save(tmp_path / "solids.npz")
+    code, _, err = here(*words, "solids.npz", "--overwrite")
+    assert code == 0
+    assert f"solids.npz has {len(solid_map.solids)} solids, which the heightfields of" in err
 
 
 def test_onboard_skips_unsupported_framework(here, tmp_path):

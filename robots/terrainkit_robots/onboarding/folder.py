@@ -8,6 +8,7 @@ from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_folder, check_parents
 from terrainkit_robots.files import require_utf8
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
+from terrainkit_robots.onboarding.frameworks.leggedgym_ex import MAP_FILES
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.text import free_name, names
 
@@ -16,6 +17,7 @@ _BACKUP_SUFFIX = ".before"
 
 _GENERATED = frozenset(
     {"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes", "__pycache__"}
+    | {*MAP_FILES}
 )
 """Files and folders that onboarding or Python writes, and that users do not edit."""
 

@@ -26,6 +26,9 @@ class OnboardOptions:
     frameworks: tuple[str, ...] = ()
     """Training frameworks to write a configuration for."""
 
+    map: Path | None = None
+    """A map on which LeggedGym-Ex, one of `frameworks`, trains the robot."""
+
     name: str = ""
     """Name of the robot and of its tasks; by default the robot's name in the file."""
 

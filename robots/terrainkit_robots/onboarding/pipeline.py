@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_robots.export.canonical import plain_name
 from terrainkit_robots.lint.settings import read_settings
 from terrainkit_robots.onboarding.convert import MJCF, convert
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
+from terrainkit_robots.onboarding.frameworks import leggedgym_ex
 from terrainkit_robots.onboarding.frameworks.frameworks import check_framework, robot_config_files
 from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
@@ -16,6 +17,9 @@ from terrainkit_robots.onboarding.repair import check_and_repair
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown
 from terrainkit_robots.spec.loops import LoopSpec, load_spec
+
+_MAP_FRAMEWORK = "leggedgym_ex"
+"""The framework whose task trains on a map of `OnboardOptions`."""
 
 
 def onboard(
@@ -47,6 +51,10 @@ def onboard(
         raise ConfigError(
             f"name: got {options.name!r}; expected a name such as {package_name(options.name)}"
         )
+    if options.map is not None and _MAP_FRAMEWORK not in options.frameworks:
+        got = listing(options.frameworks)
+        raise ConfigError(f"framework for a map: got {got}; expected {_MAP_FRAMEWORK}")
+    map_files = leggedgym_ex.map_files(options.map) if options.map is not None else {}
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
     user_spec, loop_spec = load_spec(options.spec) if options.spec else (None, LoopSpec())
@@ -67,12 +75,13 @@ def onboard(
     check_folder(target, overwrite=options.overwrite)
     options.on_step("deriving the default pose and the gains")
     robot = convert(result.report, options, user_spec)
-    result, files = _with_configs(replace(result, folder=target, robot=robot), options)
+    result = replace(result, folder=target, robot=robot)
+    result, files = _with_configs(result, options, map_files)
     return _write_folder(result, target, {**robot.files, **files}, options)
 
 
 def _with_configs(
-    result: OnboardResult, options: OnboardOptions
+    result: OnboardResult, options: OnboardOptions, map_files: Mapping[str, bytes]
 ) -> tuple[OnboardResult, dict[str, bytes]]:
     """Return the result with the names of the configurations, and their files by name."""
     assert result.robot is not None
@@ -82,14 +91,15 @@ def _with_configs(
     skipped: dict[str, str] = {}
     for framework in options.frameworks:
         try:
-            texts = robot_config_files(framework, result.robot.facts, spec)
+            on_map = map_files if framework == _MAP_FRAMEWORK else {}
+            texts = robot_config_files(framework, result.robot.facts, spec, has_map=bool(on_map))
         except ConfigError as error:
             skipped[framework] = str(error)
             continue
         if not files.keys().isdisjoint(texts) and framework not in configs:
             raise ConfigError(f"name: got {spec.name!r}, a framework; expected another one")
-        configs[framework] = tuple(texts)
-        files |= {name: text.encode() for name, text in texts.items()}
+        configs[framework] = (*texts, *on_map)
+        files |= {**{name: text.encode() for name, text in texts.items()}, **on_map}
     return replace(result, configs=configs, skipped_configs=skipped), files
 
 

@@ -60,10 +60,17 @@ def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
 def suggest_training_gains(facts: Facts) -> Mapping[str, Gain]:
     """Return gains for each actuated joint, in actuator order, with softer legs for training.
 
+    The armature is at least that of `suggest_gains`, which DYN004 asks for: it belongs to the
+    motor, not to the gains.
+
     Raises:
         CannotCheckError: if the robot cannot be simulated.
     """
-    return _compute_gains(facts, "train")
+    stiff = suggest_gains(facts)
+    return {
+        name: replace(gain, armature=max(gain.armature, stiff[name].armature))
+        for name, gain in _compute_gains(facts, "train").items()
+    }
 
 
 def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:

@@ -110,6 +110,10 @@ def test_terrain_writes_layout_and_friction_into_the_config(load):
     assert (terrain.length_per_env_pixels, terrain.width_per_env_pixels) == (80, 60)
     assert (terrain.env_length, terrain.env_width, terrain.border) == (8.0, 6.0, 20)
     assert (terrain.type, terrain.num_robots) == ("heightfield", None)
+    for kind in ("plane", "none"):
+        plane = make_cfg(kind)
+        assert load(make_map("stairs")).Terrain(plane).type == kind
+        assert vars(plane) == vars(make_cfg(kind))
 
 
 def test_terrain_has_goals_of_extreme_parkour(load):
@@ -206,8 +210,8 @@ def test_heightfield_has_no_solids(load):
 
 def test_terrain_rejects_config_that_does_not_fit(load):
     module = load(make_map("stairs"))
-    with pytest.raises(ValueError, match="got plane; expected trimesh or heightfield"):
-        module.Terrain(make_cfg("plane"))
+    with pytest.raises(ValueError, match="got triangles; expected trimesh or heightfield"):
+        module.Terrain(make_cfg("triangles"))
     with pytest.raises(ValueError, match=r"got none in patch \(0, 0\); expected goals in every"):
         module.Terrain(make_cfg(num_goals=8))
 

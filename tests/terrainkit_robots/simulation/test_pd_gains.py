@@ -61,6 +61,7 @@ def test_gains_of_every_robot(bundled, name):
             digits = f"{value:.6e}".split("e")[0].rstrip("0").rstrip(".")
             assert digits in {"1", "1.5", "2", "2.5", "3", "4", "5", "6", "8"}, gain
         assert softer.stiffness <= gain.stiffness if each.name in legs else softer == gain
+        assert softer.armature == gain.armature
     for gains in (stand, train):
         assert max_stable_time_step(sim, gains).seconds > 1.1 * TIME_STEP
 

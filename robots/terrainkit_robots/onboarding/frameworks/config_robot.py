@@ -48,6 +48,9 @@ class ConfigRobot:
     foot_height: float = 0.0
     """Height of the frames of the feet above the ground when the robot stands [m]."""
 
+    has_map: bool = False
+    """Whether the robot is trained on a map, in terrain.py beside the configuration."""
+
     @property
     def title(self) -> str:
         """Return the name of the robot for messages."""

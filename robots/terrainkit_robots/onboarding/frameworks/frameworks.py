@@ -95,13 +95,16 @@ def train_commands(name: str, spec: RobotSpec, folder: Path) -> tuple[str, list[
     return place, commands
 
 
-def robot_config_files(name: str, facts: "Facts", spec: RobotSpec) -> dict[str, str]:
+def robot_config_files(
+    name: str, facts: "Facts", spec: RobotSpec, *, has_map: bool = False
+) -> dict[str, str]:
     """Return the files for a framework of a robot whose facts are known.
 
     Args:
         name: The name of a framework.
         facts: Facts of the robot in robot.urdf.
         spec: The spec of the robot.
+        has_map: Whether the robot is trained on a map, in a framework with `map_files`.
 
     Raises:
         TerrainkitError: as `config_files`.
@@ -117,6 +120,7 @@ def robot_config_files(name: str, facts: "Facts", spec: RobotSpec) -> dict[str, 
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
         roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},
         foot_height=_foot_height(facts, spec),
+        has_map=has_map,
     )
     return config_files(name, robot)
 

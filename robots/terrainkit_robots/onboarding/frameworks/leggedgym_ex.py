@@ -1,9 +1,12 @@
 """Write the task of a robot for LeggedGym-Ex: walking in Genesis, Isaac Gym and Isaac Lab."""
 
+import warnings
 from pathlib import Path
 from shlex import quote
+from tempfile import TemporaryDirectory
 
-from terrainkit.errors import ExportError, listing
+from terrainkit.errors import ExportError, TerrainkitWarning, listing
+from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_robots.onboarding.frameworks import legged_robot, source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
@@ -12,8 +15,14 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 LEGGED_ONLY = True
 """Whether the framework supports only robots with legs."""
 
-_FOLDERS = frozenset({"base", "bipedal_walker", "g1", "go2", "tron1_pf", "tron1_sf"})
-"""The folders in `legged_gym/envs` of LeggedGym-Ex 0.3.0."""
+MAP_FILES = ("terrain.py", "terrain.npz")
+"""The files of a map in the package of a robot."""
+
+_NAMES = frozenset({"base", "bipedal_walker", "g1", "go2", "tron1_pf", "tron1_sf", "terrain"})
+"""The folders in `legged_gym/envs` of LeggedGym-Ex 0.3.0, and the module of a map."""
+
+_NUM_HEIGHTS = 17 * 11
+"""Number of measured heights in the observations on a map."""
 
 
 def config_files(robot: ConfigRobot) -> dict[str, str]:
@@ -24,9 +33,9 @@ def config_files(robot: ConfigRobot) -> dict[str, str]:
         ExportError: if LeggedGym-Ex has a task of that name.
     """
     package = package_name(robot.spec.name)
-    if package in _FOLDERS:
+    if package in _NAMES:
         raise ExportError(
-            f"name of the task: got {package!r}, a folder of LeggedGym-Ex; expected another name, "
+            f"name of the task: got {package!r}, a name in LeggedGym-Ex; expected another name, "
             f"such as --name my_{package}"
         )
     about = f"{robot.title} for LeggedGym-Ex"
@@ -36,6 +45,7 @@ def config_files(robot: ConfigRobot) -> dict[str, str]:
         name=class_name(robot.spec.name),
         package=package,
         speed_scale=legged_robot.speed_scale(robot),
+        terrain=source.fill("leggedgym_ex_map", package=package) if robot.has_map else [],
         wheels=[*source.fill("leggedgym_ex_wheels"), ""] if robot.velocity_joints else [],
         dof_pos_scale="self.dof_pos_scale" if robot.velocity_joints else "scales.dof_pos",
     )
@@ -53,6 +63,8 @@ def config_text(robot: ConfigRobot) -> str:
         ConfigError: if LeggedGym-Ex does not support the names of the bodies.
     """
     count, package = len(robot.spec.joint_order), package_name(robot.spec.name)
+    ground = "map" if robot.has_map else "plane"
+    num_observations = 9 + 3 * count + (_NUM_HEIGHTS if robot.has_map else 0)
     config = source.fill(
         "leggedgym_ex_config",
         about=source.docstring(_about(robot)),
@@ -60,7 +72,10 @@ def config_text(robot: ConfigRobot) -> str:
         here=legged_robot.HERE,
         name=class_name(robot.spec.name),
         package=package,
-        num_observations=str(9 + 3 * count),
+        num_observations=str(num_observations),
+        num_privileged_obs=str(num_observations + 3),
+        terrain=source.fill(f"leggedgym_ex_{ground}_terrain"),
+        ground_scales=source.fill(f"leggedgym_ex_{ground}_scales"),
         num_actions=str(count),
         init_state=legged_robot.init_state(robot),
         control=_control(robot),
@@ -70,6 +85,30 @@ def config_text(robot: ConfigRobot) -> str:
         dof_pos_limits=_dof_pos_limits(robot),
     )
     return source.join_lines([config])
+
+
+def map_files(path: Path) -> dict[str, bytes]:
+    """Return the files of a map for the package of a robot, by name.
+
+    Args:
+        path: The map, a .npz file.
+
+    Raises:
+        MapFileError: if the file is missing, or not a map.
+        ExportError: if Isaac Gym does not support the friction or the solids of the map.
+        TerrainkitWarning: if Genesis does not support the map.
+    """
+    terrain_map = TerrainMap.load(path)
+    if count := len(terrain_map.solids):
+        warnings.warn(
+            f"{path} has {count} solids, which the heightfields of LeggedGym-Ex in Genesis lose: "
+            "the task starts in Isaac Gym and Isaac Lab only",
+            TerrainkitWarning,
+            stacklevel=2,
+        )
+    with TemporaryDirectory() as folder:
+        terrain_map.save(Path(folder, MAP_FILES[0]))
+        return {name: Path(folder, name).read_bytes() for name in MAP_FILES}
 
 
 def train_commands(spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
@@ -89,8 +128,9 @@ def _commands(package: str, folder: str) -> list[str]:
 
 def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
+    ground = "the map of terrain.py" if robot.has_map else "flat ground"
     return [
-        f"{robot.title} for LeggedGym-Ex: flat ground.",
+        f"{robot.title} for LeggedGym-Ex: {ground}.",
         source.GENERATED_NOTE,
         "Train it in the folder of LeggedGym-Ex, in Isaac Gym without SIMULATOR:",
         "\n".join(source.indent(_commands(package, "FOLDER"))),

@@ -122,6 +122,8 @@ def test_leggedgym_ex_config_of_quadruped(load, frameworks, robots, tmp_path):
     check_joints(config, robots, spec)
     check_contacts(config.asset, spec, robots.bodies)
     assert config.env.num_observations == 9 + 3 * 12
+    assert config.env.num_privileged_obs == 12 + 3 * 12
+    assert (config.terrain.mesh_type, config.terrain.measure_heights) == ("plane", False)
     assert config.control.dt == config.control.decimation * 0.005
     assert Path(config.asset.file.format()) == tmp_path / "robot.urdf"
     assert Path(config.asset.xml_file.format()) == tmp_path / "robot.xml"
@@ -168,8 +170,70 @@ def test_leggedgym_ex_files_are_a_package(robots):
     assert "from legged_gym.envs.quad_4.quad_4_config import (" in files["quad_4.py"]
 
 
+class Walker:
+    """The environment of LeggedGym-Ex with two robots that stand at a height of 0.4 m."""
+
+    num_privileged_obs, add_noise, device = 235, True, "cpu"
+
+    def __init__(self, cfg):
+        self.cfg = cfg
+        self._parse_cfg(cfg)
+        self.commands, self.commands_scale = torch.zeros(2, 4), torch.ones(3)
+        self.actions, self.noise_scale_vec = torch.zeros(2, 12), torch.ones(232)
+        self.obs_scales = cfg.normalization.obs_scales
+        triples = ("projected_gravity", "base_ang_vel", "base_lin_vel", "base_pos")
+        joints = ("dof_pos", "default_dof_pos", "dof_vel")
+        self.simulator = SimpleNamespace(
+            **{name: torch.full((2, 3), 0.4) for name in triples},
+            **{name: torch.zeros(2, 12) for name in joints},
+            measured_heights=torch.full((2, 187), -0.3),
+            _robot=SimpleNamespace(set_dofs_armature=self.set_armature),
+            _dof_indices=range(6, 18),
+        )
+        self._init_buffers()
+
+    def set_armature(self, values, joints):
+        self.armature = dict(zip(joints, values.tolist(), strict=True))
+
+    def _parse_cfg(self, cfg):
+        """Do nothing."""
+
+    def _init_buffers(self):
+        """Do nothing."""
+
+
+def test_leggedgym_ex_trains_on_a_map(load, frameworks, robots, monkeypatch):
+    """The task replaces the terrain, and its critic observes without noise."""
+    spec, terrain = robots.quadruped(), type("Terrain", (), {})
+    registry = SimpleNamespace(task_classes={}, register=lambda *_: None)
+    content = frameworks(MORE) | {
+        "legged_gym.envs.base.legged_robot": {"LeggedRobot": Walker},
+        "legged_gym.envs.quad_4.terrain": {"Terrain": terrain},
+        "legged_gym.simulator.genesis_simulator": {"Terrain": None},
+        "legged_gym.utils.task_registry": {"task_registry": registry},
+    }
+    loaded = load("leggedgym_ex", spec, content, has_map=True)
+    config = loaded.Quad4Cfg
+    assert (config.env.num_observations, config.env.num_privileged_obs) == (45 + 187, 48 + 187)
+    assert (config.terrain.mesh_type, config.terrain.curriculum) == ("heightfield", True)
+    assert config.terrain.measure_heights
+    scales = config.rewards.scales
+    assert (scales.base_height, scales.orientation, scales.foot_clearance) == (0, 0, 0)
+    monkeypatch.setitem(sys.modules, "legged_gym.envs.quad_4.quad_4_config", loaded)
+    robot = ConfigRobot(spec=spec, has_map=True)
+    exec(config_files("leggedgym_ex", robot)["quad_4.py"], vars(loaded))
+    env = loaded.Quad4(config)
+    assert sys.modules["legged_gym.simulator.genesis_simulator"].Terrain is terrain
+    assert list(env.armature.values()) == pytest.approx(config.asset.dof_armature)
+    env.compute_observations()
+    assert env.obs_buf.shape == (2, 232)
+    # (0.4 - 0.5 + 0.3) * 5 for each height; then the velocity of the base.
+    np.testing.assert_allclose(env.privileged_obs_buf[:, 45:232], 1.0, rtol=1e-5)
+    np.testing.assert_allclose(env.privileged_obs_buf[:, 232:], 0.4, rtol=1e-5)
+
+
 def test_leggedgym_ex_rejects_name_of_its_own_robot(robots):
-    with pytest.raises(ExportError, match=r"got 'go2', a folder of LeggedGym-Ex; .* --name my_go2"):
+    with pytest.raises(ExportError, match=r"got 'go2', a name in LeggedGym-Ex; .* --name my_go2"):
         config_files("leggedgym_ex", ConfigRobot(spec=robots.quadruped(name="Go2")))
 
 
