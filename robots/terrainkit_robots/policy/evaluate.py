@@ -171,8 +171,9 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
 
 def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, waypoints, curricula and timeouts."""
-    names = "friction added_mass gains motor_strength action_delay"
-    off: dict[str, Any] = dict.fromkeys(names.split())
+    names = "friction added_mass added_mass_range gains motor_strength action_delay"
+    axes = [f"com_pos_{axis}_range" for axis in "xyz"]
+    off: dict[str, Any] = dict.fromkeys([*names.split(), *axes])
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
     return replace(
         task,

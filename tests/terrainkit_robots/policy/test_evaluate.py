@@ -41,11 +41,13 @@ def test_eval_task_keeps_custom_configs():
 
 
 def test_evaluation_env_is_not_randomized(make_run):
-    run = make_run(domain_rand=DomainRand(joint_offset=0.1))
+    own = {"added_mass_range": (1, 2), "com_pos_z_range": (0.1, 0.2)}
+    run = make_run(domain_rand=DomainRand(joint_offset=0.1, **own))
     env, _ = make_eval_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
     assert env.cfg.env.episode_length_s > 30
     assert env.cfg.runner.seed == 5
     assert not env.params.added_mass.any()
+    assert not env.params.com_shift.any()
     assert (env.params.strength == 1).all()
     assert not env.joint_offset.any()
     default_pose = np.tile(env.robot.default_pose, (3, 1))
