@@ -332,9 +332,14 @@ REWARDS: dict[str, Reward] = {
 }
 """Every reward term of this module by name."""
 
+TRACKING = tracking_lin_vel, tracking_ang_vel, progress, feet_gait, foot_swing_height, stand_still
+"""Rewards that depend on velocity commands, or on the gait that they ask for."""
+
 
 def scaled_rewards(env: "LeggedEnv") -> dict[str, tuple[Reward, float]]:
     """Return each reward term with a scale other than 0, and that scale in SI units.
+
+    Without velocity commands, the terms of this module that depend on them are left out.
 
     Raises:
         ConfigError: If the task has no scale for a term.
@@ -343,6 +348,8 @@ def scaled_rewards(env: "LeggedEnv") -> dict[str, tuple[Reward, float]]:
     for name in terms.keys() - vars(rewards).keys():
         own = type(rewards).__name__
         raise ConfigError(f"reward {name}: {own} has no field {name}; expected its scale")
+    if not env.has_velocity:
+        terms = {name: function for name, function in terms.items() if function not in TRACKING}
     scales = reward_scales(rewards, env.mass, env.robot.leg_length)
     return {
         name: (checked("reward", name, function, (env.num_envs,)), scales[name])
