@@ -129,7 +129,8 @@ class PolicyCommand(PluginCommand):
 class Evaluate(PolicyCommand):
     """Measure velocity errors, gait, falls and success of a policy.
 
-    On a plane, the commands of the robots form a grid over the command ranges of the task. On a
+    On a plane, the commands of the robots form a grid over the command ranges of the task; a task
+    with commands of its own samples them, and each robot keeps those that it starts with. On a
     map, robots walk forward, backward, left and right from the spawn origin of every patch until
     they have crossed half of it, at three quarters of the task's largest velocities. The success is
     the share that crosses, of the robots that fell or were commanded that far. The rollout has no
@@ -256,6 +257,8 @@ def summary_line(result: "ResultTable[RolloutMetrics]") -> str:
     error = "; ".join(format_errors(metrics))
     if metrics.lin_vel_error is None:
         error = "not measured: no robot walked longer than 2 s after a command"
+    if "velocity" not in about.get("commands", ["velocity"]):
+        error = "not measured: no velocities are commanded"
     return (
         f"{about['robot']}, {about['checkpoint']}, on {terrain}: "
         f"{count(metrics.robots, 'robot')}, "
@@ -276,6 +279,14 @@ def gait_lines(result: "ResultTable[RolloutMetrics]") -> list[str]:
     lines = [] if metrics.followed is None else [f"commands followed: {metrics.followed:.0%}"]
     if metrics.lin_vel_error is None:
         lines = ["commands followed: not measured"]
+    if "commands" in result.about:
+        lines = []
+    if metrics.terms:
+        means = (
+            f"{name} {'-' if value is None else f'{value:.3g}'}"
+            for name, value in metrics.terms.items()
+        )
+        lines.append(f"means (rewards per second): {', '.join(means)}")
     if metrics.swing_height is None or metrics.duty_factor is None:
         return lines
     heights = (_number(value, 100, 1) for value in metrics.swing_height)
@@ -302,18 +313,22 @@ def gait_lines(result: "ResultTable[RolloutMetrics]") -> list[str]:
 
 def result_rows(result: "ResultTable[RolloutMetrics]") -> list[tuple[str, ...]]:
     """Return the groups of a result as rows of a table: by command, or by terrain and level."""
-    groups = result.tables
+    groups, about = result.tables, result.about
+    sizes = about.get("commands", dict.fromkeys(["forward", "left", "yaw"], 1))
+    terms = [name for name in about["all"].terms or {} if not name.startswith("rew_")]
     if "by_command" in groups:
-        head = "forward", "left", "yaw", "fell", "m/s", "rad/s", "followed", "swing [cm]"
-        rows: list[tuple[str, ...]] = [head]
-        for group in groups["by_command"]:
+        head = [name if n == 1 else f"{name}[{k}]" for name, n in sizes.items() for k in range(n)]
+        head += ["fell", "m/s", "rad/s", "followed", "swing [cm]", *terms]
+        rows: list[tuple[str, ...]] = [tuple(head)]
+        for group in sorted(groups["by_command"], key=lambda group: group.command or ()):
             command = (f"{value:g}" for value in group.command or ())
             fell = str(group.falls) if group.robots == 1 else f"{group.falls}/{group.robots}"
             errors = _number(group.lin_vel_error), _number(group.ang_vel_error)
             swing = [height for height in group.swing_height or () if height is not None]
             lowest = _number(min(swing, default=None), 100, 1)
-            rows.append((*command, fell, *errors, _percent(group.followed), lowest))
-        return rows
+            means = (_number(value) for name, value in (group.terms or {}).items() if name in terms)
+            rows.append((*command, fell, *errors, _percent(group.followed), lowest, *means))
+        return _measured_columns(rows) if "commands" in about else rows
     if "by_terrain" not in groups:
         return []
     levels = [group.level for group in groups["by_level"]]
@@ -332,7 +347,13 @@ def result_rows(result: "ResultTable[RolloutMetrics]") -> list[tuple[str, ...]]:
         )
         key = group.terrain or group.direction
         rows.append((*cells, *(_percent(success.get((key, level))) for level in levels)))
-    return rows
+    return _measured_columns(rows) if "commands" in about else rows
+
+
+def _measured_columns(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Return a table without the columns in which nothing was measured."""
+    columns = [cells for cells in zip(*rows, strict=True) if {*cells[1:]} != {"-"}]
+    return list(zip(*columns, strict=True))
 
 
 def dimension_rows(result: "ResultTable[RolloutMetrics]") -> list[tuple[str, ...]]:

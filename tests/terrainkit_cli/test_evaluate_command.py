@@ -9,7 +9,12 @@ from tests.tables import read_table
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, suites
-from terrainkit_cli.evaluate_command import dimension_rows, result_rows, summary_line
+from terrainkit_cli.evaluate_command import (
+    dimension_rows,
+    gait_lines,
+    result_rows,
+    summary_line,
+)
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.result_table import ResultTable
@@ -136,6 +141,18 @@ def test_result_rows_show_success_by_level():
     head, row = result_rows(make_result(make_metrics(), **groups))
     assert head == ("terrain", "robots", "fell", "m/s", "rad/s", "success", "level 0", "1")
     assert row == ("flat", "4", "4", "-", "-", "25%", "-", "100%")
+
+
+def test_rows_of_a_task_of_the_user_have_its_commands_and_terms():
+    terms = {"rew_torques": -0.25, "tilt": 0.125}
+    groups = [make_metrics(command=(0.5, 1, 2), terms=terms, falls=0)]
+    result = make_result(make_metrics(terms=terms, success=None), by_command=groups)
+    result.about["commands"] = {"height": 1, "pose": 2}
+    head, row = result_rows(result)
+    assert head == ("height", "pose[0]", "pose[1]", "fell", "tilt")
+    assert row == ("0.5", "1", "2", "0/4", "0.125")
+    assert summary_line(result).endswith("error not measured: no velocities are commanded")
+    assert gait_lines(result) == ["means (rewards per second): rew_torques -0.25, tilt 0.125"]
 
 
 def test_suite_prints_and_writes_a_report_card(here, rejected, tmp_path, monkeypatch):

@@ -45,7 +45,12 @@ def test_task_of_the_guide_from_training_to_its_export(ran, rejected, own_tasks)
     assert rejected("evaluate run").endswith("give its Python file with --task\n")
     rollout = ("--seconds", 2.5, "--num-envs", 3, "--format", "json")
     live = json.loads(ran("evaluate", "run", *own, *rollout))
-    ran("play", "run", *own, "--seconds", 0.1, "--no-video")
+    assert live["commands"] == {"velocity": 3, "height": 1}
+    assert (len(live["by_command"]), live["all"]["followed"]) == (3, None)
+    terms = live["all"]["terms"]
+    # The mean of squares is at least the square of the mean.
+    assert terms["rew_height"] <= -20 * terms["height_error"] ** 2 < 0
+    assert "followed" not in ran("play", "run", *own, "--seconds", 0.1, "--no-video")
     ran("export", "run", *own, "-o", "policy", "--example")
     # The exported network keeps its state as the live one does.
     exported = json.loads(ran("evaluate", "--policy", "policy/policy.onnx", *own, *rollout))

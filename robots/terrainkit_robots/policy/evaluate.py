@@ -18,7 +18,7 @@ from terrainkit_robots.policy.patch_dimensions import collision_kind, patch_dime
 from terrainkit_robots.policy.policy_rollout import SETTLING_TIME, EvaluationRollout, Progress
 from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rl.config import Commands, Task
-from terrainkit_robots.rl.env import LeggedEnv, make_env
+from terrainkit_robots.rl.env import LeggedEnv, has_own_commands, make_env
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import available_processors, resolve_device
@@ -77,10 +77,17 @@ def evaluate(
     """
     config = config or EvaluationConfig()
     env, commands = make_eval_env(spec, config)
+    if config.command is not None and not env.has_velocity:
+        raise ConfigError("command: got a velocity; expected none: the task does not command it")
+    groups = commands
+    if has_own_commands(spec.task) and not config.random_commands:
+        for term in env.active_commands.values():
+            term.hold()
+        groups = np.column_stack([term.values for term in env.active_commands.values()])
     rollout = EvaluationRollout(env)
     rollout.run(load_policy(spec, env), config.seconds, commands, progress)
     has_grid = env.terrain.is_plane and config.command is None
-    return summarize(spec, config, rollout, commands if has_grid else None)
+    return summarize(spec, config, rollout, groups if has_grid else None)
 
 
 def make_eval_env(
@@ -94,7 +101,8 @@ def make_eval_env(
         max_patch_envs: Maximum number of robots on a patch if `config.num_envs` is None.
 
     Returns:
-        The environment, and commands of shape (n, 3); None for the task's random commands.
+        The environment, and commands of shape (n, 3); None for the task's random commands, as for a
+        task with commands of its own.
     """
     task = spec.task
     is_run_terrain = config.terrain is None and not is_plane(spec)
@@ -108,7 +116,7 @@ def make_eval_env(
     commands = None
     if config.command is not None:
         commands = np.array([config.command], np.float32)
-    elif not config.random_commands:
+    elif not config.random_commands and not has_own_commands(task):
         directions = direction_commands(task.commands).values()
         commands = command_grid(task.commands) if terrain.is_plane else np.array([*directions])
     rows, cols = terrain.env_origins.shape[:2]
@@ -171,8 +179,9 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
 
 def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, waypoints, curricula and timeouts."""
-    names = "friction added_mass gains motor_strength action_delay"
-    off: dict[str, Any] = dict.fromkeys(names.split())
+    names = "friction added_mass added_mass_range gains motor_strength action_delay"
+    axes = [f"com_pos_{axis}_range" for axis in "xyz"]
+    off: dict[str, Any] = dict.fromkeys([*names.split(), *axes])
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
     return replace(
         task,
@@ -238,14 +247,15 @@ def summarize(
         spec: The evaluated policy.
         config: Settings of the evaluation.
         rollout: The finished rollout.
-        commands: Command of each robot, shape (n, 3), to group by; None for no such groups.
+        commands: Command of each robot, shape (n, w), to group by; None for no such groups.
 
     Returns:
         `about["all"]` has the metrics of all robots, and `about["contacts"]` the contacts of each
         foot in the last 2 s, for the robot with the fastest forward command: one character per
         step of `dt` seconds, 1 in contact. Tables are `by_command` on a plane; `by_direction`,
         `by_direction_and_level`, `by_terrain`, `by_level`, `by_terrain_and_level` and
-        `by_terrain_dimension` on a map.
+        `by_terrain_dimension` on a map. For a task with commands of its own, `about["commands"]`
+        has how many numbers each of them has.
     """
     env = rollout.env
     groups: dict[str, list[RolloutMetrics]] = {}
@@ -253,6 +263,7 @@ def summarize(
         if mask.any():
             groups.setdefault(table, []).append(rollout.metrics(mask, **key))
     contacts = rollout.contacts()
+    sizes = {name: term.values.shape[1] for name, term in env.active_commands.items()}
     about = {
         "robot": spec.robot.spec.name,
         "checkpoint": spec.policy_name,
@@ -263,6 +274,7 @@ def summarize(
         "seed": config.seed,
         "feet": list(contacts),
         "contacts": {"dt": env.cfg.dt, **contacts},
+        **({"commands": sizes} if has_own_commands(spec.task) else {}),
         "all": rollout.metrics(np.ones(env.num_envs, bool)),
     }
     return ResultTable(about=about, tables=groups, schema_version=None)

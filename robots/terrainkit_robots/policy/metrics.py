@@ -17,7 +17,8 @@ class RolloutMetrics:
     commanded to move, and are None if there are no such robots.
 
     Attributes:
-        command: Command of the group: forward and left velocity [m/s], yaw velocity [rad/s].
+        command: Command of the group: forward and left velocity [m/s], yaw velocity [rad/s]. With
+            commands of its own, a task has other numbers: `commands` of the result names them.
         direction: Direction of the group's commands on a map.
         terrain: Terrain of the group.
         level: Level of the group.
@@ -26,6 +27,8 @@ class RolloutMetrics:
             disturbance `condition`.
         condition: Name of the disturbance of the group (`margins`), or nominal.
         unit: Unit of the disturbance; x for a factor.
+        terms: Mean of each reward but `termination`, such as `rew_torques` [1/s], and of each
+            evaluation term, for a task with commands or evaluation terms of its own.
         robots: Number of robots.
         falls: Number of robots that fell.
         success: Fraction of robots that crossed half a patch, of those that fell or whose commands
@@ -60,6 +63,7 @@ class RolloutMetrics:
     value: float | None = None
     condition: str | None = None
     unit: str | None = None
+    terms: dict[str, float | None] | None = None
     robots: int
     falls: int
     success: float | None
@@ -82,7 +86,7 @@ class RolloutMetrics:
     foot_force_peak: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the metrics as a dict, without the keys that do not define the group."""
+        """Return the metrics as a dict, without the first keys that do not apply to the group."""
         names = list(vars(self))
         keys = names[: names.index("robots")]
         return {k: v for k, v in asdict(self).items() if v is not None or k not in keys}

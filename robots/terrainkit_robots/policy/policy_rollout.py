@@ -11,7 +11,7 @@ from terrainkit_robots.policy import gait
 from terrainkit_robots.policy.load_policy import Policy
 from terrainkit_robots.policy.metrics import ErrorMean, GaitStep, RolloutMetrics
 from terrainkit_robots.policy.motor_loads import Loads
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv, has_own_commands
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
@@ -96,6 +96,9 @@ class EvaluationRollout:
         self.motion = defaultdict[str, Any](lambda: np.zeros(n))
         self.gait: list[GaitStep] = []
         self.loads = Loads(env)
+        self._has_own_commands = has_own_commands(env.cfg)
+        own = [*env.term_sums] if self._has_own_commands or env.active_terms else []
+        self.terms = {name: ErrorMean(n) for name in own if name != "rew_termination"}
 
     def run(
         self,
@@ -132,6 +135,8 @@ class EvaluationRollout:
         settled = self._update_errors(commands, velocity - commands, active)
         self._update_gait(commands, velocity, settled)
         self.loads.add(settled)
+        for name, mean in self.terms.items():
+            mean.add(self.env.term_values[name], settled)
         distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
         commanded = np.linalg.norm(self.env.curriculum.progress.target, axis=1)
         self.commanded_distance[active] = commanded[active]
@@ -175,7 +180,8 @@ class EvaluationRollout:
         self._num_steps += 1
         averaged = self._measured_steps >= self._window
         mean_error = self._recent_errors.mean(axis=0)
-        for suffix, value, mask in (("", error, settled), ("_1s", mean_error, averaged)):
+        for suffix, value, steps in (("", error, settled), ("_1s", mean_error, averaged)):
+            mask = steps & self.env.has_velocity
             self.errors[f"lin_vel_error{suffix}"].add(np.hypot(value[:, 0], value[:, 1]), mask)
             self.errors[f"ang_vel_error{suffix}"].add(np.abs(value[:, 2]), mask)
         return settled
@@ -188,10 +194,11 @@ class EvaluationRollout:
             **key: Fields of `RolloutMetrics` that define the group.
         """
         tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
-        crossed = self.crossed[mask & tried]
+        crossed = self.crossed[mask & tried & self.env.has_velocity]
         errors: dict[str, Any] = {name: error.over(mask) for name, error in self.errors.items()}
         return RolloutMetrics(
             **key,
+            terms={name: mean.over(mask) for name, mean in self.terms.items()} or None,
             robots=int(mask.sum()),
             falls=int(self.falls[mask].sum()),
             success=None
@@ -221,7 +228,7 @@ class EvaluationRollout:
         # Energy over weight times distance; the time step cancels in the ratio of the two sums.
         work = 9.81 * scene.model.body_subtreemass[scene.base] * motion["speed"].sum()
         return {
-            "followed": float(followed[commanded].mean()),
+            "followed": None if self._has_own_commands else float(followed[commanded].mean()),
             "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),
             "foot_slip": _number(gait.foot_slip(contact, foot_speed, measured)),
             "asymmetry": max(gait.asymmetry(values, mirror) for values in (heights, duty)),

@@ -95,6 +95,10 @@ class CommandTerm:
         if len(env_ids):
             self.resample(rng, env_ids)
 
+    def hold(self) -> None:
+        """Keep the values until the next reset."""
+        self._interval = np.iinfo(np.int64).max
+
 
 class VelocityCommand(CommandTerm):
     """Commanded forward and left velocity [m/s] and yaw rate [rad/s]."""

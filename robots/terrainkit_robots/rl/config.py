@@ -201,8 +201,16 @@ class DomainRand(Config):
     # legged_gym has 1 kg for a robot of any size; 7 % are 1.05 kg on the bundled quadruped.
     added_mass: Interval | None = (-0.07, 0.07)
     """Mass added to the base, as a fraction of the robot's mass."""
+    added_mass_range: Interval | None = None
+    """Mass added to the base [kg]; none: that of `added_mass`."""
     com_shift: NonNegativeFloat = 0.03
     """Largest offset of the base's center of mass along each axis [m]."""
+    com_pos_x_range: Interval | None = None
+    """Offset of the base's center of mass ahead [m]; none: up to `com_shift` to both sides."""
+    com_pos_y_range: Interval | None = None
+    """The same to the left [m]."""
+    com_pos_z_range: Interval | None = None
+    """The same upward [m]."""
     gains: NonNegativeInterval | None = (0.9, 1.1)
     """Factors on stiffness and damping of each joint."""
     motor_strength: NonNegativeInterval | None = (0.9, 1.1)
@@ -304,6 +312,17 @@ class Rewards(Config):
     """Duration of swings above 0.5 s, when the foot lands."""
     foot_clearance: float = 0.0
     """Feet that move at the swing height."""
+    hip_pos: float = 0.0
+    """Deviation from the default pose of the hip joints that move legs sideways, squared."""
+    no_fly: float = 0.0
+    """Contact of exactly one foot, for a robot on two legs."""
+    feet_stumble: float = 0.0
+    """Feet that hit something steep."""
+    torque_limits: float = 0.0
+    """Joint torques beyond their soft limits."""
+    # legged_gym has 1.0, with which the term is 0: torques are clipped at their limits.
+    soft_torque_limit: Fraction = 0.9
+    """Soft limit of the torque of a joint, as a fraction of its limit."""
     # legged_gym has a constant width of 0.25 m2/s2, with which standing still earned 64 % of the
     # tracking rewards for the biped's commands.
     tracking_sigma: PositiveFloat = 0.06

@@ -90,8 +90,8 @@ def end_episodes(env: "LeggedEnv", env_ids: Ids, unstable: BoolArray) -> dict[st
     """
     seconds, fallen = env.steps_since_reset[env_ids] * env.cfg.dt, env.state.fallen[env_ids]
     log = {
-        f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
-        for name, total in env.episode_sums.items()
+        f"Episode/{name}": float((total[env_ids] / seconds).mean())
+        for name, total in env.term_sums.items()
     }
     log["Episode/falls"] = float(fallen.mean())
     log["Episode/speed"] = float((env.path_length[env_ids] / seconds).mean())

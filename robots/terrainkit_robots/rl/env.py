@@ -53,6 +53,12 @@ def make_env(
         return kind(task, robot, terrain, device, interface)
 
 
+def has_own_commands(task: Task) -> bool:
+    """Return whether the environment of a task has commands of its own."""
+    default = LeggedEnv.command_terms
+    return getattr(task.env_class, "command_terms", default) is not default
+
+
 class LeggedEnv(VecEnv):
     """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors.
 
@@ -75,13 +81,15 @@ class LeggedEnv(VecEnv):
         params: Physical parameters of the robots; the event `params` samples them.
         actions: Scale and offset of the actions, and their joints.
         active_commands: Command terms by name, with their `values`; `commands`: the velocity
-            commands, shape (n, 3).
+            commands, shape (n, 3), 0 without `has_velocity`, the command `velocity`.
         gait, curriculum, waypoints: The gait to follow, the patches of the robots, and their goals.
         rng: Generator of all random numbers but those of the curriculum.
         buffers: Arrays that terms keep between steps, by name, which a checkpoint has.
         num_envs, num_actions: Numbers of robots, n, and of actions.
         step_dt: Time of a step [s].
         steps_since_reset: Steps of each episode, shape (n,); `path_length`: way walked [m].
+        term_values: Rewards, such as `rew_torques` [1/s], and evaluation terms of the last step,
+            shape (n,) each.
         action_history: The last three actions, the newest first, shape (3, n, a).
         joint_offset, lin_vel_bias, push_vel: Zero offsets of the joints [rad], constant error of
             the observed velocity [m/s], and velocity that the last push added [m/s].
@@ -162,7 +170,11 @@ class LeggedEnv(VecEnv):
     def _make_terms(self) -> None:
         n = self.num_envs
         self.active_commands = self.command_terms()
-        self.velocity_command = cast("VelocityCommand", self.active_commands["velocity"])
+        self.has_velocity = "velocity" in self.active_commands
+        commands = LeggedEnv.command_terms(self) | self.active_commands
+        self.velocity_command = cast("VelocityCommand", commands["velocity"])
+        if not self.has_velocity:
+            self.velocity_command.fixed = np.zeros((n, 3), np.float32)
         self.commands = self.velocity_command.values  # a view of the current commands
         self.waypoints = make_waypoints(self.cfg.commands, self.terrain, n)
         self.velocity_command.waypoints = self.waypoints
@@ -178,6 +190,13 @@ class LeggedEnv(VecEnv):
         }
         self.active_rewards = scaled_rewards(self)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.active_rewards}
+        self.active_terms = {
+            name: checked("evaluation term", name, function, (n,))
+            for name, function in self.evaluation_terms().items()
+        }
+        self.term_values: dict[str, FloatArray] = {}
+        self.term_sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
+        self.term_sums |= {name: self.add_buffer(f"sum_{name}", (n,)) for name in self.active_terms}
         self.active_terminations = [
             checked("termination", name, function, (n,))
             for name, function in self.termination_terms().items()
@@ -185,7 +204,10 @@ class LeggedEnv(VecEnv):
         self.active_events = self.event_terms()
 
     def command_terms(self) -> dict[str, CommandTerm]:
-        """Return the commands by name: `velocity`, and your own ones."""
+        """Return the commands by name: `velocity`, and your own ones.
+
+        Without `velocity`, observations and rewards of velocity commands are left out.
+        """
         cfg = self.cfg.commands
         is_map = not self.terrain.is_plane
         heading = is_map if cfg.heading_command is None else cfg.heading_command
@@ -207,6 +229,10 @@ class LeggedEnv(VecEnv):
     def termination_terms(self) -> dict[str, Callable[["LeggedEnv"], BoolArray]]:
         """Return the conditions that end an episode as a fall."""
         return dict(TERMINATIONS)
+
+    def evaluation_terms(self) -> dict[str, Reward]:
+        """Return values to log in training, as means of episodes, and to evaluate, by name."""
+        return {}
 
     def event_terms(self) -> dict[str, EventTerm]:
         """Return the events, in the order in which they happen."""
@@ -252,6 +278,9 @@ class LeggedEnv(VecEnv):
         for termination in self.active_terminations:
             state.fallen[:] |= termination(self)
         rewards = self._compute_rewards(unstable)
+        for name, term in self.active_terms.items():
+            self.term_values[name] = term(self)
+            self.term_sums[name] += self.term_values[name] * np.float32(self.cfg.dt)
         self.path_length += np.hypot(*state.base_lin_vel[:, :2].T) * self.cfg.dt
         time_out = self.episode_length_buf.numpy() >= self.max_episode_length
         if self.waypoints and self.velocity_command.fixed is None:
@@ -284,13 +313,13 @@ class LeggedEnv(VecEnv):
         self.update_observations()
 
     def set_commands(self, commands: FloatArray | None) -> None:
-        """Set fixed commands.
+        """Set fixed velocity commands, unless the task has none.
 
         Args:
             commands: Forward and left velocity [m/s] and yaw velocity [rad/s], shape (n, 3); None
                 restores the task's random commands.
         """
-        if commands is None and self.velocity_command.fixed is None:
+        if not self.has_velocity or (commands is None and self.velocity_command.fixed is None):
             return
         self.velocity_command.fixed = commands
         if commands is None:
@@ -359,6 +388,7 @@ class LeggedEnv(VecEnv):
                 if any_unstable:
                     term[unstable] = 0
                 total += term
+            self.term_values[f"rew_{name}"] = term / dt
             self.episode_sums[name] += term
         if self.cfg.rewards.only_positive_rewards:
             total = np.maximum(total, 0)
@@ -394,7 +424,7 @@ class LeggedEnv(VecEnv):
         """Start new episodes."""
         self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
         self.path_length[env_ids] = self.action_history[:, env_ids] = 0
-        for total in self.episode_sums.values():
+        for total in self.term_sums.values():
             total[env_ids] = 0
         self._call_events("reset", env_ids)
         self.curriculum.progress.reset(env_ids, self.sim.qpos[env_ids], self.yaw[env_ids])

@@ -29,7 +29,8 @@ def env_arrays(env: "LeggedEnv") -> dict[str, NDArray[Any]]:
         tables["delay"] = {"actions": env.sim.batch.expand("actuator_delay")}
     # The state has means, accelerations and forces, which cannot be computed from the physics.
     owners = {"state": env.state, "params": env.params, "waypoints": env.waypoints}
-    owners |= {"progress": env.curriculum.progress, **env.active_commands}
+    owners |= {"progress": env.curriculum.progress, "velocity": env.velocity_command}
+    owners |= env.active_commands
     tables |= {name: vars(owner) for name, owner in owners.items() if owner}
     return {
         f"{table}.{name}": array

@@ -59,13 +59,16 @@ def sample_params(env: "LeggedEnv") -> RandomizedParams:
         low, high = limits or (default, default)
         return rng.uniform(low, high, (num_envs, width)).astype(np.float32)
 
+    shifts = cfg.com_pos_x_range, cfg.com_pos_y_range, cfg.com_pos_z_range
+    low, high = np.array([limits or (-cfg.com_shift, cfg.com_shift) for limits in shifts]).T
+    mass_unit = 1.0 if cfg.added_mass_range else mass
     friction = uniform(cfg.friction, 1, float(nominal.mean()) if len(nominal) else 1.0)
     geom_friction = nominal if cfg.friction is None else friction
     return RandomizedParams(
         friction=friction,
         geom_friction=np.broadcast_to(geom_friction, (num_envs, len(nominal))).copy(),
-        added_mass=mass * uniform(cfg.added_mass, 1, 0.0),
-        com_shift=rng.uniform(-cfg.com_shift, cfg.com_shift, (num_envs, 3)).astype(np.float32),
+        added_mass=mass_unit * uniform(cfg.added_mass_range or cfg.added_mass, 1, 0.0),
+        com_shift=rng.uniform(low, high, (num_envs, 3)).astype(np.float32),
         stiffness=uniform(cfg.gains, joints, 1.0),
         damping=uniform(cfg.gains, joints, 1.0),
         strength=uniform(cfg.motor_strength, 1, 1.0),
@@ -87,7 +90,8 @@ def apply_params(sim: Simulation, params: RandomizedParams) -> None:
     mass = nominal + params.added_mass
     if mass.min() <= 0:
         got = f"a base of {nominal:.3g} kg would weigh {mass.min():.3g} kg"
-        raise ConfigError(f"domain_rand.added_mass: {got}; expected more than 0 kg")
+        name = "domain_rand.added_mass or added_mass_range"
+        raise ConfigError(f"{name}: {got}; expected more than 0 kg")
     batch.expand("body_mass")[:, base] = mass[:, 0]
     # The added mass has the shape of the base, so the inertia grows in proportion.
     batch.expand("body_inertia")[:, base] = model.body_inertia[base] * (mass / nominal)

@@ -59,7 +59,7 @@ def import_config(
         path: The file. Parent classes are read from the files of its project.
         folder: Folder for `write_config`, which the paths in robot.toml are relative to.
         class_name: Name of the class; by default the only one of the file.
-        robot: The robot, whose joints, bodies and mass some values need.
+        robot: The robot, whose joints and bodies some values need.
 
     Raises:
         ConfigError: If the file cannot be read, or does not have one such class.
@@ -190,14 +190,12 @@ def _robot_values(values: Mapping[str, Any], robot: Robot | None) -> dict[str, A
         with quiet_mujoco():
             model = mujoco.MjModel.from_xml_path(str(robot.mjcf))
         joints = {name: model.joint(name) for name in robot.spec.joint_order}
-        mass = float(model.body(robot.spec.base).subtreemass[0])
     except (KeyError, ValueError) as error:
         raise ConfigError(f"{robot.mjcf}: {one_line(str(error))}") from None
     limited = {name: joint.range for name, joint in joints.items() if model.jnt_limited[joint.id]}
     measured = {
         "bodies": [model.body(index).name for index in range(model.nbody)],
         "limits": {name: limits.tolist() for name, limits in limited.items()},
-        "mass": mass,
         "leg_length": robot.leg_length,
     }
     return {"joints": robot.spec.joint_order, "--robot": measured}

@@ -14,11 +14,11 @@ from typing import Any
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config, nested_table
 from terrainkit.settings.toml_text import parse_toml, value_text
-from terrainkit.settings.type_hint import show
+from terrainkit.settings.type_hint import NONE, show
 
 Values = Mapping[str, Any]
 """The settings of a class by name. A conversion may also need `joints`, their names, and `--robot`:
-a table with `bodies`, `limits` of joints, `mass` [kg] and `leg_length` [m]."""
+a table with `bodies`, `limits` of joints and `leg_length` [m]."""
 
 
 @cache
@@ -30,12 +30,13 @@ CONVERSIONS: dict[str, Callable[[Any, Values], Any]] = {
     "same": lambda value, _: value,
     "not": lambda value, _: not value,
     "third": lambda value, _: value[2],
-    "largest": lambda value, _: max(map(abs, value)),
+    "center of mass": lambda value, own: (
+        value if own.get("domain_rand.randomize_com_displacement", True) else NONE
+    ),
     "tilt": lambda value, _: math.acos(-value),
     "patch size": lambda _, own: [own[f"terrain.terrain_{side}"] for side in ("length", "width")],
     "seconds": lambda value, own: [n * own["sim.dt"] * own["control.decimation"] for n in value],
     "times joints": lambda value, own: value * len(own["joints"]),
-    "mass": lambda value, own: [number / own["--robot"]["mass"] for number in value],
     "leg lengths": lambda value, own: value / own["--robot"]["leg_length"],
     "pose": lambda value, own: {name: value[name] for name in own["joints"] if name in value},
     # The last part of a name holds, as in legged_gym.

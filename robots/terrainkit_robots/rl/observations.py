@@ -123,7 +123,9 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
         ),
         "actions": term(lambda env: env.state.actions, "actions"),
     }
-    if env.cfg.commands.gait_period != 0:
+    if not env.has_velocity:
+        del terms["commands"]
+    elif env.cfg.commands.gait_period != 0:
         terms["gait_phase"] = term(lambda env: env.state.gait_phase, "phase")
     if options.base_lin_vel:
         terms["base_lin_vel"] = term(

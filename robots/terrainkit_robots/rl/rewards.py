@@ -53,12 +53,16 @@ LANDING = 0.6
 CLEARANCE_SIGMA = 0.01
 """Squared error times velocity at which `foot_clearance` is exp(-1) [m3/s]; of LeggedGym-Ex."""
 
+STUMBLE = 5.0
+"""Horizontal force on a foot that stumbles, in units of the vertical one, as in legged_gym."""
+
 UNITS = {
     "base_height": (0, 2, 0),
     "lin_vel_z": (0, 2, -2),
     "ang_vel_xy": (0, 0, -2),
     "foot_slip": (0, 2, -2),
     "torques": (2, 4, -4),
+    "torque_limits": (1, 2, -2),
     "dof_acc": (0, 0, -4),
     "dof_vel": (0, 0, -2),
     "dof_power": (1, 2, -3),
@@ -299,14 +303,43 @@ def foot_clearance(env: "LeggedEnv") -> FloatArray:
     return np.exp(-(error * speed).sum(axis=1) / np.float32(CLEARANCE_SIGMA))
 
 
+def hip_pos(env: "LeggedEnv") -> FloatArray:
+    """Penalize hips that leave the default pose sideways or about the leg, squared [rad2]."""
+    hips = env.scene.hip_joints
+    return _sum_squares(env.state.dof_pos[:, hips] - env.robot.default_pose[hips])
+
+
+def no_fly(env: "LeggedEnv") -> FloatArray:
+    """Reward contact of exactly one foot: a walk on two legs, without jumps."""
+    return (env.state.foot_contact.sum(axis=1) == 1).astype(np.float32)
+
+
+def feet_stumble(env: "LeggedEnv") -> FloatArray:
+    """Penalize a foot that hits something steep: more than 5 times as much force along x and y."""
+    force = env.state.foot_force
+    horizontal = np.linalg.norm(force[..., :2], axis=2)
+    return (horizontal > STUMBLE * np.abs(force[..., 2])).any(axis=1).astype(np.float32)
+
+
+def torque_limits(env: "LeggedEnv") -> FloatArray:
+    """Penalize torques beyond their soft limits [N m]."""
+    limits = np.float32(env.cfg.rewards.soft_torque_limit) * env.robot.effort
+    return np.maximum(np.abs(env.state.torques) - limits, 0).sum(axis=1)
+
+
 REWARDS: dict[str, Reward] = {
     name: term for name, term in globals().items() if name in Rewards.__dataclass_fields__
 }
 """Every reward term of this module by name."""
 
+TRACKING = tracking_lin_vel, tracking_ang_vel, progress, feet_gait, foot_swing_height, stand_still
+"""Rewards that depend on velocity commands, or on the gait that they ask for."""
+
 
 def scaled_rewards(env: "LeggedEnv") -> dict[str, tuple[Reward, float]]:
     """Return each reward term with a scale other than 0, and that scale in SI units.
+
+    Without velocity commands, the terms of this module that depend on them are left out.
 
     Raises:
         ConfigError: If the task has no scale for a term.
@@ -315,6 +348,8 @@ def scaled_rewards(env: "LeggedEnv") -> dict[str, tuple[Reward, float]]:
     for name in terms.keys() - vars(rewards).keys():
         own = type(rewards).__name__
         raise ConfigError(f"reward {name}: {own} has no field {name}; expected its scale")
+    if not env.has_velocity:
+        terms = {name: function for name, function in terms.items() if function not in TRACKING}
     scales = reward_scales(rewards, env.mass, env.robot.leg_length)
     return {
         name: (checked("reward", name, function, (env.num_envs,)), scales[name])

@@ -8,6 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.integrations.near_geoms import NearGeoms, collides
@@ -87,6 +88,7 @@ class Scene:
         # At `default_qpos`, the position of each foot's site, and the distance from it down to the
         # lowest point of the foot [m], shapes (f, 3) and (f,).
         self.foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
+        self.hip_joints = _hip_joints(robot, model, self.default_qpos)
 
 
 def _attach(robot: Robot, terrain: Ground, task: Task) -> tuple[Any, Any]:
@@ -212,6 +214,25 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return foot_pos.astype(np.float32), np.array(depths, np.float32)
+
+
+def _hip_joints(robot: Robot, model: Any, default_qpos: Any) -> NDArray[np.int64]:
+    """Return the indices of the hip joints that turn about another axis than the pitch axis.
+
+    They are those of one leg, above its knee; a robot whose spec has no thighs has none.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = default_qpos
+    mujoco.mj_kinematics(model, data)
+    legs = np.zeros(model.nbody, np.int64)  # number of the thighs at or below each body
+    for thigh in robot.spec.thighs:
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, thigh)
+        while body > 0:
+            legs[body] += 1
+            body = model.body_parentid[body]
+    joints = [model.joint(name).id for name in robot.spec.joint_order]
+    is_pitch = np.abs(data.xaxis[joints, 1]) > np.sqrt(0.5)
+    return np.flatnonzero((legs[model.jnt_bodyid[joints]] == 1) & ~is_pitch)
 
 
 def drawn_model(scene: Scene, robot: Robot, terrain: Ground, task: Task) -> Any:

@@ -1,6 +1,7 @@
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -18,8 +19,12 @@ from terrainkit_robots.policy.evaluate import (
 )
 from terrainkit_robots.policy.metrics import ErrorMean
 from terrainkit_robots.policy.policy_rollout import EvaluationRollout
-from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
-from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.commands import CommandTerm
+from terrainkit_robots.rl.config import Commands, DomainRand, Env, Rewards, Task, Terrain
+from terrainkit_robots.rl.env import LeggedEnv, make_env
+from terrainkit_robots.rl.env_state import env_state, load_env_state
+from terrainkit_robots.rl.run import PolicySpec, open_run
+from terrainkit_robots.rl.terrain import Plane
 from tests.tables import read_table
 
 
@@ -41,11 +46,13 @@ def test_eval_task_keeps_custom_configs():
 
 
 def test_evaluation_env_is_not_randomized(make_run):
-    run = make_run(domain_rand=DomainRand(joint_offset=0.1))
+    own = {"added_mass_range": (1, 2), "com_pos_z_range": (0.1, 0.2)}
+    run = make_run(domain_rand=DomainRand(joint_offset=0.1, **own))
     env, _ = make_eval_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
     assert env.cfg.env.episode_length_s > 30
     assert env.cfg.runner.seed == 5
     assert not env.params.added_mass.any()
+    assert not env.params.com_shift.any()
     assert (env.params.strength == 1).all()
     assert not env.joint_offset.any()
     default_pose = np.tile(env.robot.default_pose, (3, 1))
@@ -150,6 +157,78 @@ def test_summary_groups_by_command(make_run):
     assert document["all"]["followed"] is None
     assert document["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert "by_terrain" not in document
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeanRewards(Rewards):
+    lean: float = -2.0
+
+
+class LeanEnv(LeggedEnv):
+    """Robots are commanded to lean to one of two angles, and not to walk."""
+
+    def command_terms(self):
+        # New commands in each step, unless they are held.
+        return {
+            "lean": CommandTerm(lambda rng, n: rng.choice([0.25, 0.5], (n, 1)), self.num_envs, 0, 1)
+        }
+
+    def reward_terms(self):
+        return super().reward_terms() | {"lean": self.evaluation_terms()["lean_angle"]}
+
+    def evaluation_terms(self):
+        return {"lean_angle": lambda env: env.active_commands["lean"].values[:, 0]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeanTask(Task):
+    env_class: ClassVar = LeanEnv
+    rewards: LeanRewards = field(default_factory=LeanRewards)
+
+
+@pytest.fixture
+def leaning(quadruped):
+    def stand(obs):
+        return torch.zeros(len(obs), 12)
+
+    return PolicySpec(task=LeanTask(), robot=quadruped, policy=stand)
+
+
+def test_task_of_the_user_is_evaluated_on_its_commands(leaning):
+    document = json.loads(evaluate(leaning, EvaluationConfig(seconds=2.1)).to_json())
+    assert document["commands"] == {"lean": 1}
+    rows = sorted(document["by_command"], key=lambda row: row["command"])
+    assert [row["command"] for row in rows] == [[0.25], [0.5]]
+    assert sum(row["robots"] for row in rows) == 16
+    for row in rows:
+        angle, rate = row["terms"]["lean_angle"], row["terms"]["rew_lean"]
+        assert [angle] == row["command"]
+        assert rate == pytest.approx(-2 * angle)
+    every = document["all"]
+    assert (every["falls"], every["lin_vel_error"], every["followed"]) == (0, None, None)
+    assert not {"rew_tracking_lin_vel", "rew_feet_gait", "rew_termination"} & {*every["terms"]}
+    sampled = evaluate(leaning, EvaluationConfig(seconds=2.1, random_commands=True))
+    assert 0.3 < sampled.about["all"].terms["lean_angle"] < 0.45
+    assert "by_command" not in sampled.tables
+    with pytest.raises(ConfigError, match="command: got a velocity; expected none"):
+        evaluate(leaning, EvaluationConfig(command=(1, 0, 0)))
+
+
+def test_task_without_velocity_commands_has_no_terms_of_them(leaning):
+    task = replace(leaning.task, env=Env(num_envs=4, num_threads=1, episode_length_s=0.1))
+    env = make_env(task, leaning.robot, Plane())
+    for terms in (*env.obs_terms.values(), env.active_rewards):
+        assert not {"commands", "gait_phase", "tracking_ang_vel", "progress"} & {*terms}
+    assert "torques" in env.active_rewards
+    env.set_commands(np.ones((4, 3), np.float32))
+    angles = []
+    for _ in range(5):
+        angles.append(env.active_commands["lean"].values.mean())
+        log = env.step(torch.zeros(4, env.num_actions))[3].get("log")
+    assert not env.state.commands.any()
+    assert log["Episode/lean_angle"] == pytest.approx(np.mean(angles))
+    assert log["Episode/rew_lean"] == pytest.approx(-2 * np.mean(angles))
+    load_env_state(env, env_state(env))
 
 
 def test_error_mean_weights_robots_equally():

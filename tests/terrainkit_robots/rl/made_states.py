@@ -63,6 +63,7 @@ def made_env(
         num_envs=n,
         mass=100 / 9.81,
         has_height_scan=True,
+        has_velocity=True,
         history_length=task.observations.history_length or 1,
         scene=SimpleNamespace(joint_units=("rad",) * joints[0]),
     )

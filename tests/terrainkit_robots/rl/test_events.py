@@ -56,6 +56,13 @@ class TestSampleParams:
             expected = [[0, 0.25, 0.5, 0.75, 1]] * width
             np.testing.assert_allclose(quarters, expected, atol=0.04, err_msg=name)
 
+    def test_kilograms_and_axes_replace_shares(self, physics_of):
+        ranges = {"added_mass_range": (1.0, 2.0), "com_pos_y_range": (0.1, 0.2)}
+        drawn = draw(physics_of(), DomainRand(**ranges, com_shift=0.05), n=400)
+        found = np.column_stack([drawn.added_mass, drawn.com_shift])
+        np.testing.assert_allclose(found.min(axis=0), [1, -0.05, 0.1, -0.05], atol=0.02)
+        np.testing.assert_allclose(found.max(axis=0), [2, 0.05, 0.2, 0.05], atol=0.02)
+
 
 class TestApplyParams:
     @pytest.mark.parametrize("kind", ["P", "V", "T"])

@@ -63,7 +63,9 @@ def test_class_with_parents(project):
     assert (rewards["units"], rewards["tracking_lin_vel"], rewards["progress"]) == ("SI", 1.0, 0.0)
     assert task["domain_rand"]["friction"] == "none"
     assert task["domain_rand"]["push_interval_s"] == 15.0
-    assert task["domain_rand"]["com_shift"] == 0.02
+    assert task["domain_rand"]["com_pos_x_range"] == [-0.01, 0.02]
+    assert (task["domain_rand"]["com_shift"], rewards["no_fly"]) == (0.0, 0.25)
+    assert task["domain_rand"]["added_mass_range"] == "none"
     assert task["domain_rand"]["action_delay"] == [0.0, 2 * 0.005 * 4]
     assert task["termination"]["tilt"] == pytest.approx(math.pi / 3)
     assert task["noise"]["noise_level"] == 0
@@ -91,9 +93,9 @@ def test_values_that_need_the_robot(project, quadruped, tmp_path):
     assert spec["default_pose"]["FL_hip_joint"] == 0.25
     knee = quadruped.spec.per_joint("default_pose")["FL_calf_joint"]
     assert spec["default_pose"]["FL_calf_joint"] == knee
-    mass = 15.0
-    added = files["task"]["domain_rand"]["added_mass"]
-    assert added == pytest.approx([-1.5 / mass, 3 / mass], rel=0.02)
+    added = files["task"]["domain_rand"]
+    assert (added["added_mass"], added["added_mass_range"]) == ("none", [-1.5, 3.0])
+    assert added["com_pos_z_range"] == "none"  # it is not randomized
     # A factor of 0 leaves the centers of the limits, which are those of 0.9.
     center = (quadruped.lower[0] + quadruped.upper[0]) / 2
     assert spec["soft_limits"]["FL_hip_joint"] == pytest.approx([center] * 2, abs=1e-3)

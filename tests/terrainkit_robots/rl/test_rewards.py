@@ -26,7 +26,8 @@ def state(n=1, **arrays):
 def rewarded(name, robot, given, **settings):
     """Return the values of a reward."""
     cfg = Task(rewards=Rewards(**settings))
-    return REWARDS[name](SimpleNamespace(state=given, robot=robot, cfg=cfg))
+    scene = SimpleNamespace(hip_joints=np.array([0]))
+    return REWARDS[name](SimpleNamespace(state=given, robot=robot, cfg=cfg, scene=scene))
 
 
 def random_state(n, seed):
@@ -150,6 +151,8 @@ def test_scales_are_in_units_of_the_robot():
     assert scales["torques"] == pytest.approx(-1 / (2 * 9.81 * length) ** 2)
     assert scales["lin_vel_z"] == pytest.approx(-9 / (length / 0.5) ** 2)
     assert scales["dof_power"] == pytest.approx(-1 / (2 * 9.81 * length / 0.5))
+    limits = reward_scales(Rewards(torque_limits=-1.0), 2.0, length)["torque_limits"]
+    assert limits == pytest.approx(-1 / (2 * 9.81 * length))
     assert reward_scales(Rewards(units="SI"), 2.0, length)["lin_vel_z"] == -9
 
 

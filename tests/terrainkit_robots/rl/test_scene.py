@@ -38,6 +38,20 @@ def contacts(model, qpos):
     return {frozenset(model.geom(g).name for g in contact.geom) for contact in data.contact}
 
 
+@pytest.mark.parametrize(
+    ("name", "hips"),
+    [
+        ("quadruped", ["FL_hip", "FR_hip", "RL_hip", "RR_hip"]),
+        ("biped", ["left_hip_roll", "left_hip_yaw", "right_hip_roll", "right_hip_yaw"]),
+        ("cart", []),  # its spec has no thighs
+    ],
+)
+def test_hip_joints_move_legs_sideways(request, nominal_task, name, hips):
+    robot = request.getfixturevalue(name)
+    found = Scene(robot, Plane(), nominal_task()).hip_joints
+    assert [robot.spec.joint_order[k] for k in found] == [f"{hip}_joint" for hip in hips]
+
+
 class TestActuators:
     def test_are_in_the_order_of_the_spec(self, scene, cart):
         model = scene.model
