@@ -29,6 +29,9 @@ _ARGUMENT = re.compile(r"`(\w+)=([^`]+)`")
 BAR_DELAY = 0.5
 """Time after which a progress bar appears [s]."""
 
+LINE_INTERVAL = 10.0
+"""Least time between two steps of a command that are printed as lines [s]."""
+
 
 def result(text: str) -> None:
     """Print a result."""
@@ -173,15 +176,19 @@ def _with_delayed_bar(items: Iterator[_T], total: int, of: str) -> Iterator[_T]:
 
 
 class Steps:
-    """Shows the current step of a command on stderr, if that is a terminal."""
+    """Shows the current step of a command on stderr; in a file, as a line from time to time."""
 
     def __init__(self, status: "Status | None") -> None:
         self._status = status
+        self._print_time = time.monotonic()
 
     def update(self, step: str) -> None:
         """Show a step."""
         if self._status is not None:
             self._status.update(step)
+        elif time.monotonic() - self._print_time >= LINE_INTERVAL:
+            note(step)
+            self._print_time = time.monotonic()
 
     def stop(self) -> None:
         """Show no step any more."""

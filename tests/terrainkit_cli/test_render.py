@@ -1,4 +1,5 @@
 import warnings
+from types import SimpleNamespace
 
 import pytest
 
@@ -24,3 +25,12 @@ def test_warnings_are_one_line(capsys, monkeypatch):
 def test_reports_are_60_to_120_columns_wide(monkeypatch, columns, width):
     monkeypatch.setenv("COLUMNS", str(columns))
     assert render.width() == width
+
+
+def test_steps_in_a_file_are_lines_from_time_to_time(capsys, monkeypatch):
+    times = iter([0.0, 9.9, 10.0, 10.0, 19.9, 20.1, 20.1])
+    monkeypatch.setattr(render, "time", SimpleNamespace(monotonic=times.__next__))
+    with render.steps() as steps:
+        for share in ("1%", "2%", "3%", "4%"):
+            steps.update(share)
+    assert capsys.readouterr().err == "terrainkit: 2%\nterrainkit: 4%\n"

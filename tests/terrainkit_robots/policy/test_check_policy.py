@@ -1,9 +1,15 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from terrainkit_robots.policy import check_policy
-from terrainkit_robots.policy.check_policy import check_contract, check_values
+from terrainkit_robots.policy.check_policy import (
+    check_contract,
+    check_values,
+    find_causes,
+    judge_motion,
+)
 from terrainkit_robots.policy.contracts.contract_repairs import Repair
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.tasks import get_task
@@ -49,6 +55,44 @@ def test_change_with_which_the_robot_walks_names_the_fault(found, contract, robo
     assert wrong.joints[0] == "FR_hip_joint"
     motion, cause = check_contract(wrong, found.policy, robot, task)
     assert (motion.code, cause.code, cause.expected) == ("POL010", "POL020", "front legs")
+
+
+@pytest.mark.parametrize(
+    ("velocity", "fell", "score", "is_followed"),
+    [
+        ((0.3, 0, 0.4), False, 0.5, True),  # the error is 0.5 of a command of 1.0
+        ((0.3, 0, 0), False, 1 - 0.73**0.5, False),  # walks, and ignores that it should turn
+        ((0.6, 0, 1.36), False, 0.44, False),  # turns 1.7 times as fast
+        ((0.6, 0.8, 0.8), False, 0.2, True),  # a velocity that is not commanded only costs score
+        ((0.6, 0, 0.8), True, 0, False),
+    ],
+)
+def test_each_commanded_velocity_is_followed_by_half(velocity, fell, score, is_followed):
+    command = np.array([[0.6, 0, 0.8]])
+    found, faults = judge_motion(command, np.array([velocity]), np.array([fell]))
+    assert found == pytest.approx(score)
+    assert (faults == []) == is_followed
+
+
+def test_robot_commanded_to_stand_may_drift_slowly():
+    for drift, is_still in ((-0.25, True), (0.26, False)):
+        mean = np.array([[0, drift, 0]])
+        score, faults = judge_motion(np.zeros((1, 3)), mean, np.array([False]))
+        assert score == pytest.approx(1 - abs(drift) / 0.5)
+        assert (faults == []) == is_still
+
+
+def test_changes_that_follow_all_commands_with_half_the_error_are_causes(contract):
+    changes = [Repair("POL021", text, contract) for text in "abcdef"]
+    ignored = ["commanded 0.38, 0.00, 0.75, it moves with 0.38, 0.00, 0.00"]
+
+    def named(*results):
+        return [cause.expected for cause in find_causes(0.7, changes, results)]
+
+    assert named((0.84, []), (0.99, ignored)) == []
+    assert named((0.86, []), (0.9, []), (0.89, ignored)) == ["b", "a"]  # an error below 0.15
+    assert named((0.86, []), (0.92, [])) == ["b"]
+    assert named(*[(0.9, [])] * 4) == ["a", "b", "c"]
 
 
 def test_contracts_for_other_networks_are_found(found, contract, robot):
