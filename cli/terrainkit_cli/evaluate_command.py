@@ -253,6 +253,7 @@ def summary_line(result: "ResultTable[RolloutMetrics]") -> str:
     if about["collision"] != "plane":
         terrain += f" (collision: {about['collision']})"
     success = "" if metrics.success is None else f", {_percent(metrics.success)} success"
+    success += "" if metrics.drift is None else f" with {_percent(metrics.drift)} sideways drift"
     error = "; ".join(format_errors(metrics))
     if metrics.lin_vel_error is None:
         error = "not measured: no robot walked longer than 2 s after a command"

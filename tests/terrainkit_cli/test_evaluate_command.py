@@ -223,7 +223,7 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
 
     monkeypatch.setattr(policy_limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")
-    told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each round of each test\n"
+    told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each round\n"
     assert (code, err) == (0, told)
     assert out.splitlines() == [
         "test    90 % cross               50 % cross              crossed"

@@ -176,8 +176,7 @@ def limit_rows(table: ResultTable[LimitResult]) -> list[tuple[str, ...]]:
         cells = []
         for values in (result.at_90, result.at_50):
             estimate, low, high = (_bounded(value, result) for value in values)
-            interval = "" if low == high else f" ({low} to {high})"
-            cells.append(f"{estimate} {unit}{interval}")
+            cells.append(f"{estimate} {unit} ({low} to {high})")
         counts = (f"{n}/{of} at {_number(value, result.unit)}" for value, n, of in result.counts)
         limit = f"{_number(result.robot_limit, result.unit)} {unit}"
         rows.append((result.test, *cells, ", ".join(counts), limit))
@@ -273,4 +272,4 @@ def _bounded(value: float, result: LimitResult) -> str:
 
 
 def _number(value: float, unit: str) -> str:
-    return f"{value:.0f}" if unit == "degrees" else f"{100 * value:.1f}"
+    return f"{value if unit == 'degrees' else 100 * value:.1f}"

@@ -81,10 +81,10 @@ def test_limits_beyond_the_tested_values_are_bounds(measure):
     rows = limit_rows(measure([1, -1] * 5 + [1]))
     assert rows[0] == ("test", "90 % cross", "50 % cross", "crossed", "limit of the robot")
     by_test = {row[0]: row[1:3] for row in rows}
-    assert by_test["step up"] == ("> 40.0 cm", "> 40.0 cm")  # twice the limit of 20 cm
-    assert by_test["step down"] == ("< 2.5 cm", "< 2.5 cm")
-    assert by_test["one bar"] == ("> 72.0 cm", "> 72.0 cm")  # not the highest one
-    assert by_test["corridor"][1] == "< 20.0 cm"  # also the narrowest one
+    assert by_test["step up"] == 2 * ("> 40.0 cm (> 40.0 to > 40.0)",)  # twice the limit of 20 cm
+    assert by_test["step down"] == 2 * ("< 2.5 cm (< 2.5 to < 2.5)",)
+    assert by_test["one bar"] == 2 * ("> 72.0 cm (> 72.0 to > 72.0)",)  # not the highest one
+    assert by_test["corridor"][1] == "< 20.0 cm (< 20.0 to < 20.0)"  # also the narrowest one
     assert rows[1][3] == "10/10 at 20.8, 10/10 at 36.6, 40/40 at 40.0"
 
 
