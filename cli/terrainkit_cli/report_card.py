@@ -107,7 +107,7 @@ def report_limits(
     from terrainkit_robots.report_card.policy_limits import limit_rows, measure_limits
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
-    render.note(f"measuring the limits of {spec.policy_name}: {repetitions} robots in each test")
+    render.note(f"measuring the limits of {spec.policy_name}: {repetitions} robots in each round")
     with render.steps() as steps:
         result = measure_limits(
             spec,

@@ -227,20 +227,28 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
         assert repetitions == 10
         assert robot_limits.step_up == pytest.approx(0.1792)
         result = LimitResult(
-            test="stairs", unit="m", passed=0.1, failed=0.12, crossed=7, robot_limit=0.1792
+            test="stairs",
+            unit="m",
+            tested=(0.02, 0.36),
+            at_90=(0.1, 0.02, 0.11),
+            at_50=(0.13, 0.12, 0.14),
+            counts=((0.1, 9, 10), (0.14, 3, 20)),
+            robot_limit=0.1792,
         )
         about = {"robot": "hare", "checkpoint": "hare.onnx", "repetitions": 10, "seed": 1}
         return ResultTable(about=about, tables={"limits": (result,)})
 
     monkeypatch.setattr(policy_limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")
-    told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each test\n"
+    told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each round\n"
     assert (code, err) == (0, told)
     assert out.splitlines() == [
-        "test    10 of 10 cross  next value          limit of the robot",
-        "stairs  10.0 cm         7 of 10 at 12.0 cm  17.9 cm",
+        "test    90 % cross               50 % cross              crossed"
+        "                     limit of the robot",
+        "stairs  10.0 cm (< 2.0 to 11.0)  13.0 cm (12.0 to 14.0)  9/10 at 10.0, 3/20 at 14.0"
+        "  17.9 cm",
         "",
         "wrote limits.json",
     ]
     document = json.loads((tmp_path / "limits.json").read_text())
-    assert document["limits"][0]["passed"] == 0.1
+    assert document["limits"][0]["at_90"] == [0.1, 0.02, 0.11]

@@ -31,8 +31,9 @@ class RolloutMetrics:
             evaluation term, for a task with commands or evaluation terms of its own.
         robots: Number of robots.
         falls: Number of robots that fell.
-        success: Fraction of robots that crossed half a patch, of those that fell or whose commands
-            led that far; None if there are none, as on a plane.
+        success: Fraction of robots that crossed half a patch along their commands, of those that
+            fell or whose commands led that far; None if there are none, as on a plane.
+        drift: Mean sideways distance of the robots that crossed, as a share of half a patch.
         lin_vel_error: Norm of the horizontal velocity error [m/s].
         lin_vel_error_1s: The same with velocities averaged over 1 s, which removes the sway of the
             gait.
@@ -67,6 +68,7 @@ class RolloutMetrics:
     robots: int
     falls: int
     success: float | None
+    drift: float | None = None
     lin_vel_error: float | None
     lin_vel_error_1s: float | None
     ang_vel_error: float | None

@@ -71,9 +71,9 @@ def command_schedule(commands: FloatArray | None, num_steps: int) -> list[FloatA
 class EvaluationRollout:
     """A rollout that measures each robot up to its first fall.
 
-    On a map, a robot is measured until it has crossed half a patch: the terrain beyond belongs to
-    another patch. It succeeds if it crosses. A robot that was commanded less than that distance,
-    and did not fall, says nothing about the terrain.
+    On a map, a robot is measured until it has crossed half a patch along its commands: the terrain
+    beyond belongs to another patch. It succeeds if it crosses. A robot that was commanded less than
+    that distance, and did not fall, says nothing about the terrain.
     """
 
     def __init__(self, env: LeggedEnv) -> None:
@@ -82,7 +82,7 @@ class EvaluationRollout:
         self.start_pos = env.curriculum.progress.start.copy()
         self.half_patch = np.inf if env.terrain.is_plane else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
-        self.commanded_distance = np.zeros(n)
+        self.commanded_distance, self.sideways = np.zeros(n), np.zeros(n)
         names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
         self.errors = {name: ErrorMean(n) for name in names}  # as in `RolloutMetrics`
         self._settling_steps = round(SETTLING_TIME / dt)
@@ -137,10 +137,14 @@ class EvaluationRollout:
         self.loads.add(settled)
         for name, mean in self.terms.items():
             mean.add(self.env.term_values[name], settled)
-        distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
-        commanded = np.linalg.norm(self.env.curriculum.progress.target, axis=1)
+        target = self.env.curriculum.progress.target
+        commanded = np.linalg.norm(target, axis=1)
         self.commanded_distance[active] = commanded[active]
-        self.crossed |= active & (distance > self.half_patch)
+        direction = target / np.maximum(commanded, 1e-9)[:, None]
+        x, y = (state.base_pos[:, :2] - self.start_pos).T
+        crossed = active & (x * direction[:, 0] + y * direction[:, 1] > self.half_patch)
+        self.sideways[crossed] = np.abs(x * direction[:, 1] - y * direction[:, 0])[crossed]
+        self.crossed |= crossed
 
     def _update_gait(self, commands: FloatArray, velocity: FloatArray, settled: BoolArray) -> None:
         state = self.env.state
@@ -195,6 +199,7 @@ class EvaluationRollout:
         """
         tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
         crossed = self.crossed[mask & tried & self.env.has_velocity]
+        sideways = self.sideways[mask & self.crossed]
         errors: dict[str, Any] = {name: error.over(mask) for name, error in self.errors.items()}
         return RolloutMetrics(
             **key,
@@ -204,6 +209,7 @@ class EvaluationRollout:
             success=None
             if self.env.terrain.is_plane or not crossed.size
             else float(crossed.mean()),
+            drift=float(sideways.mean()) / self.half_patch if sideways.size else None,
             **errors,
             **self._gait_metrics(mask),
             **self.loads.metrics(mask),

@@ -1,9 +1,9 @@
-"""The limits of a policy: the hardest step, gap, slope and passage that all robots cross."""
+"""The limits of a policy: success over the size of steps, gaps, slopes and passages."""
 
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,16 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
+from terrainkit_robots.report_card.success_curve import fit_success
 from terrainkit_robots.rl.run import PolicySpec
+from terrainkit_robots.transforms import FloatArray
 
-# Bisection has 21 outcomes, none of the values to all of them, and takes at most five rounds.
-LEVELS = 20
-"""Values of each quantity."""
+# Each round is one value of each quantity. The first ones approach the limit as bisection does.
+TARGETS = (0.5, 0.5, 0.5, 0.9, 0.5, 0.9)
+"""Success at which each round measures."""
 
-PATCH_SIZE = (8.0, 4.0)
+# Four obstacles in a row fit. A robot that creeps up a ramp runs out of time, unlike on 8 m.
+PATCH_SIZE = (12.0, 4.0)
 """Size of the patches along x and y [m]."""
 
 CELL = 0.05
@@ -51,15 +54,14 @@ class LimitTest:
     """Parameter that is the quantity."""
 
     values: Range
-    """Values of the parameter at the first and the last level."""
+    """Easiest and hardest value of the parameter."""
 
     fixed: Mapping[str, float]
     """Other parameters."""
 
-    def sub_terrain(self, level: int) -> SubTerrain:
-        """Return the terrain at a level, 0 to `LEVELS` - 1."""
-        value = at_difficulty(self.values, level / (LEVELS - 1))
-        parameters = {**self.fixed, self.parameter: value}
+    def sub_terrain(self, hardness: float) -> SubTerrain:
+        """Return the terrain at a hardness, 0 for the first value to 1 for the last one."""
+        parameters = {**self.fixed, self.parameter: at_difficulty(self.values, hardness)}
         return SubTerrain(terrain=self.terrain, name=self.name, parameters=parameters)
 
     @property
@@ -67,11 +69,15 @@ class LimitTest:
         """The unit of the results: m or degrees."""
         return "degrees" if self.limit == "slope" else "m"
 
-    def value(self, level: int, grid: Grid) -> float:
-        """Return the realized quantity at a level, in the unit of the results."""
-        realized: Any = self.sub_terrain(level).at(0.0).realized(grid)[self.parameter]
-        # A pair differs between x and y; robots walk along x.
-        value = float(realized[0] if isinstance(realized, tuple) else realized)
+    def realized(self, hardness: float, grid: Grid) -> float:
+        """Return the hardness of the realized value, which may be a number of whole cells."""
+        value: Any = self.sub_terrain(hardness).at(0.0).realized(grid)[self.parameter]
+        first, last = self.values
+        return (float(value) - first) / (last - first)
+
+    def value(self, hardness: float) -> float:
+        """Return the quantity at a hardness, in the unit of the results."""
+        value = at_difficulty(self.values, hardness)
         return math.degrees(value) if self.parameter == "roll" else self.in_unit(value)
 
     def in_unit(self, value: float) -> float:
@@ -82,9 +88,10 @@ class LimitTest:
 def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
     """Return the tests for a robot.
 
-    Steps, gaps and slopes are 0.1 to 2 times its limit; gaps are whole cells. Corridors are 3 times
-    (at most 1.5 m) to half of its width, and stones 8 times to half of its foothold. Ceilings are
-    at 1.2 times its standing height to a tenth of that below its crouched height.
+    Steps, gaps and slopes are 0.1 to 2 times its limit; gaps are whole cells, of at most 2 m.
+    Corridors are 3 times (at most 1.5 m) to half of its width, and stones 8 times to half of its
+    foothold. Ceilings are at 1.2 times its standing height to a tenth of that below its crouched
+    height.
     """
     steps = (0.1 * limits.step_up, 2 * limits.step_up)
     drops = (0.1 * limits.step_down, 2 * limits.step_down)
@@ -94,29 +101,35 @@ def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
     ceilings = (1.2 * limits.standing_height, lowest)
     corridors = (min(3 * limits.body_width, 1.5), 0.5 * limits.body_width)
     stones = (max(8 * limits.foothold, 0.1), 0.5 * limits.foothold)
-    gaps = (0.1 * limits.gap, 2 * limits.gap)
+    fewest, most = (round(share * limits.gap / CELL) for share in (0.1, 2))
+    gaps = (CELL * max(fewest, 1), CELL * min(max(most, 2), 40))
     # A robot starts and ends on flat ground, and only the tested quantity changes.
     ramps = {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0}
-    bars = {"start": 1.5, "max_depth": 0.4, "spacing": 2.0}
+    one_bar = {"start": 1.5, "max_depth": 0.4, "spacing": 6.0}
+    four_bars = {**one_bar, "spacing": 2.0}
+    one_gap = {"start": 1.5, "depth": 5.0, "min_spacing": 6.0, "max_spacing": 6.0}
+    four_gaps = {**one_gap, "min_spacing": 2.5, "max_spacing": 2.5}
     level = {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
     one_tread = {"platform": 2.0, "step_width": 1.0}
     return (
         LimitTest("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
         LimitTest("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
-        LimitTest("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
-        LimitTest("gap", "gap", "gap", "width", gaps, {"platform": 2.0}),
+        LimitTest("stairs", "step_up", "stairs", "step_height", steps, {"landing": 3.5}),
+        LimitTest("one gap", "gap", "gap_track", "length", gaps, one_gap),
+        LimitTest("four gaps", "gap", "gap_track", "length", gaps, four_gaps),
         LimitTest("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
         LimitTest("slope across", "slope", "side_ramps", "roll", rolls, ramps),
-        LimitTest("clearance", "crouched_height", "crawl", "clearance", ceilings, bars),
+        LimitTest("one bar", "crouched_height", "crawl", "clearance", ceilings, one_bar),
+        LimitTest("four bars", "crouched_height", "crawl", "clearance", ceilings, four_bars),
         LimitTest("stone", "foothold", "stones_everywhere", "stone", stones, level),
         LimitTest("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
     )
 
 
-def limits_config(tests: Sequence[LimitTest], levels: Sequence[int], seed: int) -> MapConfig:
-    """Return the map of one patch for each test, at its level."""
+def limits_config(tests: Sequence[LimitTest], hardness: Sequence[float], seed: int) -> MapConfig:
+    """Return the map of one patch for each test, at its hardness."""
     return MapConfig(
-        terrains=tuple(t.sub_terrain(level) for t, level in zip(tests, levels, strict=True)),
+        terrains=tuple(t.sub_terrain(value) for t, value in zip(tests, hardness, strict=True)),
         rows=1,
         cols=len(tests),
         patch_size=PATCH_SIZE,
@@ -129,7 +142,7 @@ def limits_config(tests: Sequence[LimitTest], levels: Sequence[int], seed: int) 
 
 @dataclass(frozen=True, kw_only=True)
 class LimitResult:
-    """The limit of a policy in a test."""
+    """The success of a policy in a test: counts, and a curve that is fitted to them."""
 
     test: str
     """Name of the test."""
@@ -137,14 +150,18 @@ class LimitResult:
     unit: str
     """Unit of the values: m or degrees."""
 
-    passed: float | None
-    """Hardest value that all robots cross; None if they do not cross the easiest one."""
+    tested: tuple[float, float]
+    """The easiest and the hardest value. An estimate that equals one of them is a bound."""
 
-    failed: float | None
-    """Next value, which some robots do not cross; None if they cross the hardest one."""
+    at_90: tuple[float, ...]
+    """Value with a success of 90 %: the estimate, and the easier and the harder end of its 95 %
+    interval."""
 
-    crossed: int | None
-    """Number of robots that cross the next value."""
+    at_50: tuple[float, ...]
+    """The same for a success of 50 %."""
+
+    counts: tuple[tuple[float, int, int], ...]
+    """Value, robots that crossed, and robots that started, from easy to hard."""
 
     robot_limit: float
     """Limit of the robot for feasibility."""
@@ -152,15 +169,17 @@ class LimitResult:
 
 def limit_rows(table: ResultTable[LimitResult]) -> list[tuple[str, ...]]:
     """Return the limits as rows of text with a header."""
-    total = table.about["repetitions"]
     rows: list[tuple[str, ...]] = []
-    rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
+    rows.append(("test", "90 % cross", "50 % cross", "crossed", "limit of the robot"))
     for result in table["limits"]:
-        following = "-"
-        if result.failed is not None:
-            following = f"{result.crossed} of {total} at {_text(result.failed, result.unit)}"
-        passed = "none" if result.passed is None else _text(result.passed, result.unit)
-        rows.append((result.test, passed, following, _text(result.robot_limit, result.unit)))
+        unit = "degrees" if result.unit == "degrees" else "cm"
+        cells = []
+        for values in (result.at_90, result.at_50):
+            estimate, low, high = (_bounded(value, result) for value in values)
+            cells.append(f"{estimate} {unit} ({low} to {high})")
+        counts = (f"{n}/{of} at {_number(value, result.unit)}" for value, n, of in result.counts)
+        limit = f"{_number(result.robot_limit, result.unit)} {unit}"
+        rows.append((result.test, *cells, ", ".join(counts), limit))
     return rows
 
 
@@ -171,13 +190,13 @@ def measure_limits(
     config: EvaluationConfig,
     progress: Progress = lambda _: None,
 ) -> ResultTable[LimitResult]:
-    """Return the limits of a policy, by bisection: what is easier than a passed value, is passed.
+    """Return the limits of a policy. Each round measures near the limit by the rounds before.
 
     Args:
         spec: The policy, such as a run.
         limits: The limits of its robot, which determine the values.
-        repetitions: Robots on each patch.
-        config: Seed and device.
+        repetitions: Robots in each test and round.
+        config: Seed and device. Each round has its own starts.
         progress: Called with the completed fraction of the rounds, 0 to 1.
 
     Raises:
@@ -186,44 +205,55 @@ def measure_limits(
     """
     tests = limit_tests(limits)
     columns = np.repeat(np.arange(len(tests)), repetitions)
-    passed, failed = np.full(len(tests), -1), np.full(len(tests), LEVELS)
-    crossed = np.zeros(len(tests), int)
-    rounds = math.ceil(math.log2(LEVELS + 1))
-    for number in range(rounds):
-        levels = np.clip((passed + failed) // 2, 0, LEVELS - 1)
+    hardness, crossed = np.empty((2, len(tests), 0))
+    for number, share in enumerate(TARGETS):
+        asked = [
+            float(fit_success(*counts, repetitions)[share][0])
+            for counts in zip(hardness, crossed, strict=True)
+        ]
+        seed = config.seed + number
         # A map of these patches alone: the time of a step grows with the number of solids.
-        terrain_map = _generate(limits_config(tests, levels.tolist(), config.seed))
-        crossing = Crossing(spec, terrain_map, len(columns), config)
+        terrain_map = _generate(limits_config(tests, asked, seed))
+        crossing = Crossing(spec, terrain_map, len(columns), replace(config, seed=seed))
         outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
-        counts = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
-        is_open, all_cross = failed - passed > 1, counts == repetitions
-        passed = np.where(is_open & all_cross, levels, passed)
-        failed = np.where(is_open & ~all_cross, levels, failed)
-        crossed = np.where(is_open & ~all_cross, counts, crossed)
-        progress((number + 1) / rounds)
-    grid = terrain_map.config.patch_grid(0, 0)
-    results = []
-    for test, low, high, count in zip(
-        tests, passed.tolist(), failed.tolist(), crossed.tolist(), strict=True
-    ):
-        is_last = high == LEVELS
-        results.append(
-            LimitResult(
-                test=test.name,
-                unit=test.unit,
-                passed=test.value(low, grid) if low >= 0 else None,
-                failed=None if is_last else test.value(high, grid),
-                crossed=None if is_last else count,
-                robot_limit=test.in_unit(getattr(limits, test.limit)),
-            )
-        )
+        counted = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
+        grid = terrain_map.config.patch_grid(0, 0)
+        realized = [test.realized(x, grid) for test, x in zip(tests, asked, strict=True)]
+        hardness = np.column_stack([hardness, realized])
+        crossed = np.column_stack([crossed, counted])
+        progress((number + 1) / len(TARGETS))
     about = {
         "robot": spec.robot.spec.name,
         "checkpoint": spec.policy_name,
         "repetitions": repetitions,
         "seed": config.seed,
     }
-    return ResultTable(about=about, tables={"limits": results})
+    results = [
+        _result(test, values, counts, repetitions, test.in_unit(getattr(limits, test.limit)))
+        for test, values, counts in zip(tests, hardness, crossed, strict=True)
+    ]
+    return ResultTable(about=about, tables={"limits": results}, schema_version=2)
+
+
+def _result(
+    test: LimitTest, hardness: FloatArray, crossed: FloatArray, starts: int, robot_limit: float
+) -> LimitResult:
+    """Return the result of a test from the hardness and the counts of each round."""
+    fit = fit_success(hardness, crossed, starts)
+    at_90, at_50 = ([test.value(x) for x in fit[share].tolist()] for share in (0.9, 0.5))
+    counts = [
+        (test.value(x), int(crossed[hardness == x].sum()), starts * int((hardness == x).sum()))
+        for x in np.unique(hardness).tolist()
+    ]
+    return LimitResult(
+        test=test.name,
+        unit=test.unit,
+        tested=(test.value(0.0), test.value(1.0)),
+        at_90=tuple(at_90),
+        at_50=tuple(at_50),
+        counts=tuple(counts),
+        robot_limit=robot_limit,
+    )
 
 
 def _generate(config: MapConfig) -> TerrainMap:
@@ -232,5 +262,14 @@ def _generate(config: MapConfig) -> TerrainMap:
         return generate(config)
 
 
-def _text(value: float, unit: str) -> str:
-    return f"{value:.0f} degrees" if unit == "degrees" else f"{100 * value:.1f} cm"
+def _bounded(value: float, result: LimitResult) -> str:
+    """Return an estimate as text; the ends of the tested values are bounds."""
+    easiest, hardest = result.tested
+    if value not in result.tested:
+        return _number(value, result.unit)
+    sign = ">" if (value == hardest) == (hardest > easiest) else "<"
+    return f"{sign} {_number(value, result.unit)}"
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value if unit == 'degrees' else 100 * value:.1f}"

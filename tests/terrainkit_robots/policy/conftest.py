@@ -89,7 +89,7 @@ def make_run(tmp_path: Path) -> Callable[..., Run]:
 
 
 class SlidingEnv(LeggedEnv):
-    """Robots whose bases move with given velocities, and fall at given times."""
+    """Robots whose bases move ahead and left at given velocities, and fall at given times."""
 
     velocities: Any = np.zeros((1, 3), np.float32)
     """Forward, left and yaw velocity of each robot, shape (n, 3)."""
@@ -105,10 +105,11 @@ class SlidingEnv(LeggedEnv):
         time, state = self.num_steps * self.cfg.dt, self.state
         state.base_lin_vel[:, :2] = self.velocities[:, :2]
         state.base_ang_vel[:, 2] = self.velocities[:, 2]
-        distance = self.velocities[:, 0] * np.float32(time)
-        state.base_pos[:, :2] = self.curriculum.progress.start + np.column_stack(
-            [distance, np.zeros(self.num_envs)]
-        )
+        progress = self.curriculum.progress
+        x, y = progress.target.T / np.maximum(np.linalg.norm(progress.target, axis=1), 1e-9)
+        ahead, left = self.velocities[:, :2].T * np.float32(time)
+        moved = np.column_stack([ahead * x - left * y, ahead * y + left * x])
+        state.base_pos[:, :2] = progress.start + moved
         dones = torch.from_numpy(np.isclose(self.fall_times, time))
         return obs, rewards, dones, {"time_outs": torch.zeros_like(dones)}
 

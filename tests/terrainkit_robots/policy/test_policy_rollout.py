@@ -144,6 +144,15 @@ def test_success_is_half_a_patch(make_sliding, map_terrain):
     assert counts[1] == counts[0] < 100
     metrics = measured.metrics(np.ones(5, bool))
     assert (metrics.success, metrics.falls) == (0.4, 1)
+    assert metrics.drift == pytest.approx(0, abs=1e-6)
+
+
+def test_sideways_drift_does_not_cross(make_sliding, map_terrain):
+    # 3 m forward, in 3 s with 0.75 m to the side, and in 4.3 s with 3 m, after the end.
+    env = make_sliding([[1, 0.25, 0], [0.7, 0.7, 0]], terrain=map_terrain)
+    measured = run(env, 4.0, np.tile(FORWARD, (2, 1)))
+    metrics = measured.metrics(select(1, 1))
+    assert (metrics.success, metrics.drift) == (0.5, pytest.approx(0.25, abs=0.01))
 
 
 def test_commands_that_do_not_cross_a_patch_measure_no_success(make_sliding, map_terrain):

@@ -4,6 +4,7 @@ import math
 import numpy as np
 import pytest
 
+from terrainkit import generate
 from tests.limits import LIMITS as SHARED_LIMITS
 from tests.tables import read_table
 
@@ -13,12 +14,12 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card import policy_limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
 from terrainkit_robots.report_card.policy_limits import (
-    LEVELS,
     limit_rows,
     limit_tests,
     limits_config,
     measure_limits,
 )
+from terrainkit_robots.report_card.success_curve import fit_success
 from terrainkit_robots.rl.run import open_run
 
 LIMITS = dataclasses.replace(SHARED_LIMITS, slope=0.577, crouched_height=0.35)
@@ -26,72 +27,82 @@ LIMITS = dataclasses.replace(SHARED_LIMITS, slope=0.577, crouched_height=0.35)
 
 @pytest.fixture
 def measure(monkeypatch):
-    """Return a function that measures a policy that crosses the levels up to a highest one.
+    """Return a function that measures a policy that crosses up to a hardness.
 
-    One of two robots crosses the level after it.
+    One of ten robots always fails if `lapse` is set.
     """
 
-    def run(highest, limits=LIMITS):
+    def run(highest, limits=LIMITS, lapse=0):
         class Known:
-            def __init__(self, _, terrain_map, num_envs, __):
+            def __init__(self, _, terrain_map, num_envs, config):
                 assert terrain_map.difficulty.shape == (1, len(highest))
-                self.num_envs, parameters = num_envs, terrain_map.parameters[0].tolist()
-                self.levels = []
+                seeds.append(config.seed)
+                self.num_envs, self.hardness = num_envs, []
+                parameters = terrain_map.parameters[0].tolist()
                 for each, test in zip(parameters, limit_tests(limits), strict=True):
-                    (easy, hard), value = test.values, each.requested[test.parameter]
-                    self.levels.append(round((value - easy) / (hard - easy) * (LEVELS - 1)))
-                assert 0 <= min(self.levels) <= max(self.levels) < LEVELS
+                    easy, hard = test.values
+                    self.hardness.append((each.requested[test.parameter] - easy) / (hard - easy))
+                assert -1e-9 <= min(self.hardness) <= max(self.hardness) <= 1 + 1e-9
 
             def attempt(self, levels, columns):
                 assert len(levels) == len(columns) == self.num_envs
-                above = np.array(self.levels)[columns] - np.array(highest)[columns]
-                ok = above <= np.arange(len(columns)) % 2
+                ok = np.array(self.hardness)[columns] <= np.array(highest)[columns]
+                ok &= np.arange(len(columns)) % 10 >= lapse
                 outcomes = np.where(ok, CROSSED, FELL).astype(np.int8)
                 return Attempts(outcomes=outcomes, seconds=np.zeros(len(levels)))
 
+        seeds = []
         monkeypatch.setattr(limits_module, "Crossing", Known)
-        return measure_limits(open_run("quadruped"), limits, 2, EvaluationConfig(seed=3))
+        table = measure_limits(open_run("quadruped"), limits, 10, EvaluationConfig(seed=3))
+        assert seeds == [3, 4, 5, 6, 7, 8]  # other starts in each round
+        return table
 
     return run
 
 
-def test_bisection_finds_the_hardest_level_of_each_test(measure):
-    values = 0.02 + 0.38 * np.arange(LEVELS) / (LEVELS - 1)  # 0.1 to 2 times 0.2 m
-    for highest in ([-1, 0, 1, 2, 9, 10, 17, 18, 19], [19, 18, 17, 10, 9, 2, 1, 0, -1]):
-        results = measure(highest)["limits"]
-        for result, level in zip(results, highest, strict=True):
-            assert (result.passed is None) == (level < 0)
-            assert (result.failed is None) == (level == LEVELS - 1)
-            assert result.crossed == (None if result.failed is None else 1)
-        step_up, _, stairs = results[:3]
-        assert step_up.failed == (pytest.approx(values[0]) if highest[0] < 0 else None)
-        assert stairs.passed == pytest.approx(values[highest[2]], abs=1e-6)
-        assert stairs.failed == pytest.approx(values[highest[2] + 1], abs=1e-6)
+def test_limits_are_between_the_values_that_were_crossed_and_those_that_were_not(measure):
+    highest = np.linspace(0.1, 0.9, 11)
+    results = measure(highest)["limits"]
+    for result, test, hardness in zip(results, limit_tests(LIMITS), highest, strict=True):
+        easy, hard = result.tested
+        span, value = hard - easy, test.value(hardness)
+        tolerance = 0.15 if test.parameter == "length" else 0.08  # gaps are whole cells
+        at_50, low, high = result.at_50
+        assert abs(at_50 - value) <= tolerance * abs(span)
+        assert low / span <= at_50 / span <= high / span
+        assert result.at_90[0] / span <= at_50 / span
+        assert sum(starts for _, _, starts in result.counts) == 60
+        near = (starts for at, _, starts in result.counts if abs((at - value) / span) < 0.2)
+        assert sum(near) >= 24
+        assert list(result.counts) == sorted(result.counts, reverse=easy > hard)
 
 
-def test_limits_of_a_robot_with_long_legs(measure):
-    """The gap of 1.3 m ends at the sides of the patch, but not along x."""
-    results = measure([19] * 9, dataclasses.replace(LIMITS, gap=0.65))["limits"]
-    assert results[3].passed == pytest.approx(1.3)
+def test_limits_beyond_the_tested_values_are_bounds(measure):
+    rows = limit_rows(measure([1, -1] * 5 + [1]))
+    assert rows[0] == ("test", "90 % cross", "50 % cross", "crossed", "limit of the robot")
+    by_test = {row[0]: row[1:3] for row in rows}
+    assert by_test["step up"] == 2 * ("> 40.0 cm (> 40.0 to > 40.0)",)  # twice the limit of 20 cm
+    assert by_test["step down"] == 2 * ("< 2.5 cm (< 2.5 to < 2.5)",)
+    assert by_test["one bar"] == 2 * ("> 72.0 cm (> 72.0 to > 72.0)",)  # not the highest one
+    assert by_test["corridor"][1] == "< 20.0 cm (< 20.0 to < 20.0)"  # also the narrowest one
+    assert rows[1][3] == "10/10 at 20.8, 10/10 at 36.6, 40/40 at 40.0"
 
 
-def test_limits_are_printed_with_units(measure):
-    results = measure([9, 9, 9, 9, 9, 9, -1, 19, 9])
-    rows = limit_rows(results)
-    assert rows[:2] == [
-        ("test", "2 of 2 cross", "next value", "limit of the robot"),
-        ("step up", "20.0 cm", "1 of 2 at 22.0 cm", "20.0 cm"),
-    ]
-    assert ("clearance", "none", "1 of 2 at 72.0 cm", "35.0 cm") in rows
-    assert {row[0]: row[2:] for row in rows}["stone"][0] == "-"
-    document = results.document()
-    about = [document[key] for key in ("robot", "checkpoint", "repetitions", "seed")]
-    assert about == ["quadruped", open_run("quadruped").checkpoint.name, 2, 3]
-    assert document["limits"][0]["passed"] == pytest.approx(0.2)
+def test_lapses_do_not_move_the_limit(measure):
+    """Nine of ten cross everything up to half of the values."""
+    (result, *_) = measure([0.5] * 11, lapse=1)["limits"]
+    assert result.at_50[0] == pytest.approx(0.21, abs=0.02)
+    assert result.at_90[1] == pytest.approx(0.02)  # the easiest: the success may be below 90 %
 
 
-def test_slopes_across_are_as_steep_as_slopes_up(measure):
-    results = {each.test: each.passed for each in measure([19] * 9)["limits"]}
+def test_limits_of_a_robot_with_long_legs():
+    tests = limit_tests(dataclasses.replace(LIMITS, gap=1.2))[3:5]
+    assert [test.values for test in tests] == [pytest.approx((0.1, 2.0))] * 2
+    assert generate(limits_config(tests, [1, 1], 5)).difficulty.shape == (1, 2)
+
+
+def test_slopes_across_are_as_steep_as_slopes_up():
+    results = {each.name: each.value(1.0) for each in limit_tests(LIMITS)}
     steepest = pytest.approx(math.degrees(math.atan(2 * 0.577)))
     assert (results["slope across"], results["slope up and down"]) == (steepest, steepest)
 
@@ -114,16 +125,42 @@ def test_values_of_small_and_wide_robots_are_bounded():
     tests = {each.name: each.values for each in limit_tests(odd)}
     assert tests["corridor"] == pytest.approx((1.5, 0.3))
     assert tests["stone"] == pytest.approx((0.1, 0.005))
-    assert tests["clearance"][1] == pytest.approx(0.02)
+    assert tests["four bars"][1] == pytest.approx(0.02)
 
 
 def test_map_of_limits_has_a_patch_for_each_test():
-    levels = [0, 19, 1, 2, 3, 4, 5, 6, 7]
-    config = limits_config(limit_tests(LIMITS), levels, 5)
-    assert (config.rows, config.cols, config.seed) == (1, 9, 5)
-    assert (config.patch_size, config.cell) == ((8.0, 4.0), 0.05)
-    parameters = [each.parameters for each in config.terrains]
+    hardness = [0, 1, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
+    terrain_map = generate(limits_config(limit_tests(LIMITS), hardness, 5))
+    assert (terrain_map.difficulty.shape, terrain_map.config.seed) == ((1, 11), 5)
+    parameters = [each.requested for each in terrain_map.parameters[0].tolist()]
     assert parameters[0]["depth"] == pytest.approx(0.02)
-    assert parameters[1] == {"platform": 2.0, "step_width": 1.0, "step_height": pytest.approx(0.5)}
-    assert parameters[2]["step_height"] == pytest.approx(0.04)  # level 1 of 19: 0.02 + 0.38 / 19
-    assert parameters[3] == {"platform": 2.0, "width": pytest.approx(0.12)}  # 0.04 + 2 * 0.04
+    assert parameters[1]["step_height"] == pytest.approx(0.5)
+    assert parameters[2]["step_height"] == pytest.approx(0.039)  # 0.02 + 0.05 * 0.38
+    goals = [len(terrain_map.patch(0, col).goals) for col in range(11)]
+    assert goals[3:5] == [1, 4]
+    assert goals[7:9] == [1, 4]
+
+
+@pytest.mark.parametrize(
+    ("hardness", "crossed", "at_50"),
+    [
+        ([0.4, 0.6], [10, 0], 0.5),  # symmetric
+        ([0.2, 0.4, 0.5, 0.6, 0.8], [10, 8, 5, 2, 0], 0.5),
+        ([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [9, 9, 9, 9, 9, 0], 0.55),  # 9 of 10 up to 0.5
+        ([0.5, 1.0], [10, 10], 1.0),
+        ([0.0, 0.5], [0, 0], 0.0),
+    ],
+)
+def test_curve_crosses_half_where_half_of_the_robots_cross(hardness, crossed, at_50):
+    fit = fit_success(hardness, crossed, 10)
+    assert fit[0.5][0] == pytest.approx(at_50, abs=0.02)
+    for median, low, high in fit.values():
+        assert 0 <= low <= median <= high <= 1
+    assert np.all(fit[0.9] <= fit[0.5])
+
+
+def test_curve_is_harder_with_more_successes_and_surer_with_more_starts():
+    few, more = (fit_success([0.2, 0.5, 0.8], [10, n, 0], 10) for n in (3, 7))
+    assert np.all(few[0.5] < more[0.5])
+    _, low, high = fit_success([0.2, 0.5, 0.8], [40, 12, 0], 40)[0.5]
+    assert high - low < few[0.5][2] - few[0.5][1]
