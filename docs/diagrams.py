@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 import mujoco
 import numpy as np
 import trimesh
-from svg import BLUE, GRAY, GREEN, INK, ORANGE, PALE, RED, Drawing
+from svg_drawing import BLUE, GRAY, GREEN, INK, ORANGE, PALE, RED, Drawing
 
 import terrainkit
 from terrainkit.terrain.sub_terrain import SubTerrain

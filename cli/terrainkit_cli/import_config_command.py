@@ -47,8 +47,8 @@ class ImportConfig(Command):
         write_config(imported, self.output, overwrite=self.overwrite)
         counts = [len(imported.taken), len(imported.without_effect), len(imported.listed)]
         render.result(
-            f"{imported.name}: {counts[0]} of {sum(counts)} settings taken; {counts[1]} without "
-            f"effect here; {counts[2]} not taken:"
+            f"{imported.name}: {counts[0]} of {sum(counts)} settings taken; {counts[1]} make no "
+            f"difference here; {counts[2]} not taken:"
         )
         for reason in dict.fromkeys(imported.listed.values()):
             keys = (key for key, other in imported.listed.items() if other == reason)

@@ -59,7 +59,7 @@ def test_export_run_into_its_own_folder(terrainkit, run_folder):
     assert first.endswith("141 observations to 12 actions, from model_2.pt")
     assert second.startswith("verified: largest difference from the checkpoint: policy.onnx ")
     assert second.endswith(", policy.pt 0.0e+00")
-    assert note.startswith("readers of metadata of mjlab lack moving_gait_phase, and stop")
+    assert "stop at unknown observations: moving_gait_phase; add them" in note
     assert json.loads((run_folder / "exported" / "policy.json").read_text())["iteration"] == 2
     run = terrainkit("export", "run", "--checkpoint", 1, "-o", "a")
     assert run.stdout.splitlines()[0].endswith("141 observations to 12 actions, from model_1.pt")

@@ -20,7 +20,7 @@ def test_import_config(terrainkit, rejected, tmp_path):
     run = terrainkit(*command.split())
     assert (run.returncode, run.stderr) == (0, "")
     assert run.stdout.splitlines() == [
-        "MyCfg: 3 of 5 settings taken; 1 without effect here; 1 not taken:",
+        "MyCfg: 3 of 5 settings taken; 1 make no difference here; 1 not taken:",
         "  env.env_spacing: each robot has a world of its own",
         "wrote my_task: task.toml, map.toml",
         "next: terrainkit train ROBOT --config my_task/task.toml --terrain my_task/map.toml",

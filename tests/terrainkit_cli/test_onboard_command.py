@@ -41,7 +41,7 @@ def test_onboard_name_is_that_of_the_task(here, tmp_path):
     words = ("quadruped", "--name", "quad", NO_PICTURES, "--config", "leggedgym_ex")
     code, out, err = here(*words)
     assert (code, err) == (0, "")
-    assert f"  cp -r {tmp_path / 'quad'} legged_gym/envs/quad\n" in out
+    assert f"  cp -r {tmp_path / 'quad'}/. legged_gym/envs/quad\n" in out
     assert "train.py --task=quad --headless\n" in out
     for file in ("__init__.py", "quad.py", "quad_config.py"):
         assert (tmp_path / "quad" / file).is_file()

@@ -163,8 +163,9 @@ def _unknown_terms(contract: Contract) -> list[str]:
         if own in _FORMULAS
     }
     known = "; ".join(dict.fromkeys(formulas[name] for name in unknown if name in formulas))
-    what = f"readers of {FORMATS[contract.style]} lack {listing(unknown)}, and stop"
-    return [f"{what}; add what policy.json describes{': ' if known else ''}{known}"]
+    what = f"controllers that read it stop at unknown observations: {listing(unknown)}"
+    add = f"add them as policy.json describes{': ' if known else ''}{known}"
+    return [f"{FORMATS[contract.style]}: {what}; {add}"]
 
 
 def _write_files(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -24,6 +24,7 @@ from terrainkit_robots.rl.legged_gym_names import (
     names,
 )
 from terrainkit_robots.rl.run import MAP_FILE, TASK_FILE
+from terrainkit_robots.spec.provenance import with_provenance
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec
 
@@ -69,7 +70,7 @@ def import_config(
     rows = _counterparts(values, imported)
     settings = {**values, **_robot_values(values, robot)}
     off = {row.here for key, row in rows.items() if row.off is not None and not values[key]}
-    writers = _writers(robot, folder)
+    writers = _writers(robot, folder, path.name)
     drafts: dict[str, dict[str, Any]] = {file: {} for file in writers}
     for key, row in rows.items():
         # A flag that is true sets nothing, and a setting that is off has no effect.
@@ -131,7 +132,7 @@ _FILES = {"robot": SPEC_FILE, "map": MAP_FILE}
 """Files by the first part of our names."""
 
 
-def _writers(robot: Robot | None, folder: Path) -> dict[str, Callable[[Draft], str]]:
+def _writers(robot: Robot | None, folder: Path, source: str) -> dict[str, Callable[[Draft], str]]:
     """Return functions that check the settings of a file, and return its text, by its name."""
     base = Task.from_table(base_settings())
 
@@ -155,7 +156,8 @@ def _writers(robot: Robot | None, folder: Path) -> dict[str, Callable[[Draft], s
         for key in ("urdf", "mjcf"):
             file = (robot.folder / getattr(robot.spec, key)).resolve()
             changes[key] = os.path.relpath(file, folder.resolve())
-        return Robot.from_spec(replace(robot.spec, **changes), folder).spec.to_toml()
+        spec = with_provenance(replace(robot.spec, **changes), robot.spec, source)
+        return Robot.from_spec(spec, folder).spec.to_toml()
 
     return {TASK_FILE: task_text, SPEC_FILE: robot_text, MAP_FILE: map_text}
 

@@ -91,6 +91,7 @@ def test_values_that_need_the_robot(project, quadruped, tmp_path):
     assert spec["termination_contacts"] == ["base"]
     # Joints without a new angle keep theirs.
     assert spec["default_pose"]["FL_hip_joint"] == 0.25
+    assert spec["provenance"]["default_pose.FL_hip_joint"]["origin"] == "given"
     knee = quadruped.spec.per_joint("default_pose")["FL_calf_joint"]
     assert spec["default_pose"]["FL_calf_joint"] == knee
     added = files["task"]["domain_rand"]

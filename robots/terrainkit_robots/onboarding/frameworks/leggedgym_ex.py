@@ -117,10 +117,10 @@ def train_commands(spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
 
 
 def _commands(package: str, folder: str) -> list[str]:
-    # The file may lack a newline at the end.
+    # The file may lack a newline at the end. With /., a second copy replaces the first one.
     line = rf"\nfrom legged_gym.envs.{package} import {package}\n"
     return [
-        f"cp -r {quote(folder)} legged_gym/envs/{package}",
+        f"cp -r {quote(folder)}/. legged_gym/envs/{package}",
         f"printf '{line}' >> legged_gym/envs/__init__.py",
         f"SIMULATOR=genesis python legged_gym/scripts/train.py --task={package} --headless",
     ]
