@@ -3,6 +3,7 @@
 import io
 import os
 import re
+import shlex
 import shutil
 import sys
 import textwrap
@@ -108,7 +109,13 @@ def _print_message(message: str) -> None:
 
 def _option(argument: re.Match[str]) -> str:
     """Return the option of the command line for a Python argument: --scale 0.01."""
-    name, value = argument[1].replace("_", "-"), re.sub("[(),']", "", argument[2])
+    name, value = argument[1].replace("_", "-"), argument[2]
+    if value.startswith("("):
+        value = value.strip("()").replace(",", "")
+    elif value.startswith("'"):
+        value = value.strip("'")
+    else:
+        value = shlex.quote(value)
     return {"True": f"--{name}", "False": f"--no-{name}"}.get(value, f"--{name} {value}")
 
 

@@ -67,6 +67,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
     floating = has_floating_base(facts) if floating is None else floating
     actuated = {joint.name for joint in facts.actuated}
     link_names = {link.name for link in links}
+    renamed: dict[str, str] = {}
     if WORLD in link_names:
         new_name = free_name(f"{WORLD}_link", link_names)
         if not facts.tree.links[WORLD].virtual:
@@ -76,6 +77,7 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
             changes.append(f"added the base link {new_name} for the world, with joints {attached}")
         links = [replace(link, name=new_name) if link.name == WORLD else link for link in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
+        renamed[WORLD] = new_name
     imu = facts.model.imu
     moving = {before for joint, before in joints if joint.moves}
     tendons = tuple(
@@ -104,7 +106,12 @@ def to_canonical(facts: Facts, *, floating: bool | None = None) -> CanonicalRobo
         },
         imu=imu if imu is not None and imu[0] in link_names else None,
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
-        loops=tuple(loop for loop in facts.model.loops if link_names.issuperset(loop.links)),
+        loops=tuple(
+            replace(loop, links=(renamed.get(first, first), renamed.get(second, second)))
+            for loop in facts.model.loops
+            for first, second in [loop.links]
+            if {first, second} <= link_names
+        ),
         couplings=tuple(
             coupling
             for coupling in facts.model.couplings

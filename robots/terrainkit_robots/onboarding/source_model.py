@@ -1,6 +1,7 @@
 """The source of a robot as a MuJoCo model, and the gains that MuJoCo computes."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.description.model import Dynamics, Joint
+from terrainkit_robots.description.model import WORLD, Dynamics, Joint
 from terrainkit_robots.description.xml.document import RobotFileError, read_bytes
 from terrainkit_robots.onboarding.comparison import Side, joint_names_of, make_side
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -96,7 +97,9 @@ def described_model(facts: Facts, written: Facts) -> Any:
             continue
         joint = facts.tree.parent_joint[name]
         bodies[name] = bodies[joint.parent].add_body(
-            name=name, pos=joint.origin[:3, 3], quat=matrix_to_quat(joint.origin[:3, :3])
+            name=f"{WORLD}_link" if name == WORLD else name,  # as in the written files
+            pos=joint.origin[:3, 3],
+            quat=matrix_to_quat(joint.origin[:3, :3]),
         )
         if joint.moves:
             is_slide = joint.kind == "prismatic"
@@ -111,14 +114,7 @@ def described_model(facts: Facts, written: Facts) -> Any:
                 damping=[max(joint.damping, 0.0), 0, 0],
                 frictionloss=max(joint.friction, 0.0),
             )
-    for joint in mimic_joints(facts.joints):
-        assert joint.mimic is not None
-        spec.add_equality(
-            type=mujoco.mjtEq.mjEQ_JOINT,
-            name1=joint.name,
-            name2=joint.mimic.joint,
-            data=[joint.mimic.offset, joint.mimic.multiplier, *[0] * 10],
-        )
+    _add_equalities(spec, facts, bodies)
     moments = {}
     for body in facts.bodies:
         made = bodies[body.top.name]
@@ -134,6 +130,37 @@ def described_model(facts: Facts, written: Facts) -> Any:
         model.body(name).mass, model.body(name).inertia = body.mass, principal
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def _add_equalities(spec: Any, facts: Facts, bodies: Mapping[str, Any]) -> None:
+    """Add the constraints of mimic joints and of closed loops.
+
+    Args:
+        spec: The `mujoco.MjSpec`.
+        facts: The robot.
+        bodies: The MuJoCo body of each link.
+    """
+    import mujoco
+
+    for joint in mimic_joints(facts.joints):
+        assert joint.mimic is not None
+        spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            name1=joint.name,
+            name2=joint.mimic.joint,
+            data=[joint.mimic.offset, joint.mimic.multiplier, *[0] * 10],
+        )
+    for loop in facts.model.loops:
+        ends = [f"{loop.name}_{number}" for number in (1, 2)]
+        for end, link, origin in zip(ends, loop.links, loop.origins, strict=True):
+            quat = matrix_to_quat(origin[:3, :3])
+            bodies[link].add_site(name=end, pos=origin[:3, 3], quat=quat)
+        spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_WELD if loop.kind == "weld" else mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=ends[0],
+            name2=ends[1],
+        )
 
 
 def with_compiled_gains(facts: Facts) -> Facts:

@@ -234,12 +234,13 @@ def find_causes(
         candidates: The changes.
         results: Score of each change, and what its robots did not do.
     """
-    order = sorted(range(len(results)), key=lambda k: -results[k][0])
-    least = max(1 - MAX_ERROR * (1 - score), results[order[0]][0] - SIMILAR)
+    pairs = zip(candidates, results, strict=True)
+    follow = [(new, repair) for repair, (new, faults) in pairs if not faults]
+    follow.sort(key=lambda pair: -pair[0])
+    least = max([1 - MAX_ERROR * (1 - score), *(new - SIMILAR for new, _ in follow[:1])])
     findings = []
-    for k in order[:MAX_NAMED]:
-        (new, faults), repair = results[k], candidates[k]
-        if not faults and new > least:
+    for new, repair in follow[:MAX_NAMED]:
+        if new > least:
             got = f"score {score:.2f} of 1 in simulation, and {new:.2f} if {repair.text}"
             hint = "correct the contract, or its reader"
             findings.append(Finding(repair.code, got, repair.text, hint))

@@ -1,6 +1,7 @@
 """Step the target of each joint of a written robot, with the base held in the air."""
 
 import copy
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +49,8 @@ class StepResponse:
             return "moves away from its target"
         if self.error > MAX_ERROR:
             return f"ends {self.error:.0%} of the step away from its target"
+        if math.isinf(self.rise_time):
+            return "does not reach 90 % of the step"
         if self.rise_time > MAX_RISE_TIME:
             return f"takes {self.rise_time:.2g} s for 90 % of the step"
         if self.overshoot > MAX_OVERSHOOT:

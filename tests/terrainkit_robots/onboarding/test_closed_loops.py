@@ -89,6 +89,7 @@ def test_loops_of_a_spec_close_a_urdf(result, tmp_path):
         again = onboard(result.folder / "robot.urdf", tmp_path / "out", options)
         said = dict(summarize(again))
         assert said["loops"].startswith("4 loops closed within 0.")
+        assert "differs" not in said
         assert "robot.urdf, which genesis reads, has none" in said["loops"]
         assert said["standing"].startswith("yes: 5 s with the gains of robot.toml")
         assert again.robot.spec.joint_order == result.robot.spec.joint_order

@@ -87,12 +87,15 @@ def test_changes_that_follow_all_commands_with_half_the_error_are_causes(contrac
     ignored = ["commanded 0.38, 0.00, 0.75, it moves with 0.38, 0.00, 0.00"]
 
     def named(*results):
-        return [cause.expected for cause in find_causes(0.7, changes, results)]
+        causes = find_causes(0.7, changes[: len(results)], results)
+        return [cause.expected for cause in causes]
 
     assert named((0.84, []), (0.99, ignored)) == []
     assert named((0.86, []), (0.9, []), (0.89, ignored)) == ["b", "a"]  # an error below 0.15
     assert named((0.86, []), (0.92, [])) == ["b"]
     assert named(*[(0.9, [])] * 4) == ["a", "b", "c"]
+    assert named((0.98, ignored), (0.92, [])) == ["b"]
+    assert named() == []
 
 
 def test_contracts_for_other_networks_are_found(found, contract, robot):

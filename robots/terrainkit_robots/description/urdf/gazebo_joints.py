@@ -1,7 +1,6 @@
 """Read the SDF joints in the <gazebo> elements of a URDF, which close loops."""
 
 from collections.abc import Iterator
-from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,9 +29,12 @@ def gazebo_loops(
         root: The element <robot>.
         robot: Its links and joints.
     """
-    for number, element in enumerate(islice(root.iterfind("gazebo/joint"), MAX_LOOPS), 1):
-        if element.find("parent[@link]") is not None:
-            continue  # a joint of URDF, which is reported as misplaced
+    # A joint of URDF, which has links as attributes, is reported as misplaced.
+    joints = (j for j in root.iterfind("gazebo/joint") if j.find("parent[@link]") is None)
+    for number, element in enumerate(joints, 1):
+        if number > MAX_LOOPS:
+            yield element, f"got more than {MAX_LOOPS} loops"
+            return
         try:
             yield element, _loop(element, number, robot)
         except ConfigError as error:

@@ -11,6 +11,7 @@ from terrainkit_robots.onboarding.frameworks import legged_robot, source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.text import count
 
 LEGGED_ONLY = True
 """Whether the framework supports only robots with legs."""
@@ -96,13 +97,15 @@ def map_files(path: Path) -> dict[str, bytes]:
     Raises:
         MapFileError: if the file is missing, or not a map.
         ExportError: if Isaac Gym does not support the friction or the solids of the map.
+
+    Warns:
         TerrainkitWarning: if Genesis does not support the map.
     """
     terrain_map = TerrainMap.load(path)
-    if count := len(terrain_map.solids):
+    if num_solids := len(terrain_map.solids):
         warnings.warn(
-            f"{path} has {count} solids, which the heightfields of LeggedGym-Ex in Genesis lose: "
-            "the task starts in Isaac Gym and Isaac Lab only",
+            f"{path} has {count(num_solids, 'solid')}, which the heightfields of LeggedGym-Ex in "
+            "Genesis lose: the task starts in Isaac Gym and Isaac Lab only",
             TerrainkitWarning,
             stacklevel=2,
         )
