@@ -40,8 +40,10 @@ _PROJECT_FILES = ("setup.py", "pyproject.toml", "setup.cfg", ".git")
 _LIBRARY = {"pi": math.pi}
 """What is known of each imported library, such as numpy."""
 
-_SCOPES = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-_SCOPES += (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+_SCOPES = (
+    *(ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda),
+    *(ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp),
+)
 """Parts of a statement that have names of their own."""
 
 _MAX_NUMBER = 1e30
@@ -119,11 +121,10 @@ class Module:
             match node:
                 case ast.ClassDef(name=name, bases=bases):
                     own = Namespace()
-                    for base in reversed(bases):
-                        if not (isinstance(base, ast.Name) and base.id == "object"):
-                            parent = self._value(base, names, outer)
-                            known = parent if isinstance(parent, Namespace) else {PARENT: parent}
-                            self._update(own, known)
+                    for base in reversed([b for b in bases if getattr(b, "id", "") != "object"]):
+                        parent = self._value(base, names, outer)
+                        known = parent if isinstance(parent, Namespace) else {PARENT: parent}
+                        self._update(own, known)
                     self._run(node.body, own, outer)
                     names[name] = self._checked(own)
                 case (
@@ -136,10 +137,8 @@ class Module:
                 case ast.ImportFrom(names=aliases):
                     found = self._imported(node)
                     lost = _unread(node)
-                    for alias in aliases:
-                        own_name = alias.asname or alias.name
-                        missing = {own_name: found.get(alias.name, lost)}
-                        self._update(names, found if own_name == "*" else missing)
+                    named = {a.asname or a.name: found.get(a.name, lost) for a in aliases}
+                    self._update(names, found if "*" in named else named)
                 case ast.AnnAssign(value=None) | ast.Pass() | ast.FunctionDef():
                     pass
                 case _:  # such as a condition, a loop, or a change of a value
@@ -154,10 +153,9 @@ class Module:
                 names[name] = lost
             case ast.alias(name=name, asname=own_name):
                 names[own_name or name] = lost
-            case ast.Attribute(ctx=ast.Store() | ast.Del()):
-                self._lose_owner(part, lost, names, outer)
-            case ast.Subscript(ctx=ast.Store() | ast.Del()):
-                self._lose_owner(part, lost, names, outer)
+            case ast.Attribute(ctx=context) | ast.Subscript(ctx=context):
+                if not isinstance(context, ast.Load):
+                    self._lose_owner(part, lost, names, outer)
             case ast.Expr(value=ast.Call(func=ast.Attribute(value=owner))):
                 if self._value(owner, names, outer) != _LIBRARY:  # as in np.seterr(...)
                     self._lose_owner(owner, lost, names, outer)
@@ -201,7 +199,7 @@ class Module:
             file = next((file.resolve() for file in files if file.is_file()), None)
         except OSError:  # such as a name that is too long
             return Namespace()
-        if file in self.modules:
+        if file is not None and file in self.modules:
             return self.modules[file]
         if file is None or len(self.modules) == MAX_FILES:
             return Namespace()
@@ -221,10 +219,8 @@ class Module:
         """Return the value of an expression; one of the errors of `_value` if it is not read."""
         result: Any
         match node:
-            case ast.Constant(value=bool() | str() | None as value):
-                result = value
-            case ast.Constant(value=int() | float() as value):
-                result = _number(value)
+            case ast.Constant(value=bool() | int() | float() | str() | None as value):
+                result = _number(value) if isinstance(value, int | float) else value
             case ast.Name(id=name):
                 result = names[name]
             case ast.Attribute(value=owner, attr=name):
