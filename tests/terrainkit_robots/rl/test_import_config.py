@@ -148,6 +148,8 @@ def test_number_of_inherited_values_is_bounded(project):
 def test_large_values_are_not_computed(project):
     imported, _ = project("class A:\n class env:\n  num_envs = 9**9**9\n")
     assert imported.listed == {"env.num_envs": "not read: line 3: 9 ** 9 ** 9"}
+    imported, _ = project(f"class A:\n class env: num_envs = 0x1{'0' * 4500}")
+    assert imported.listed == {"env.num_envs": "not read: line 2: a number of too many digits"}
     # Each list has the one before it twice: 2^40 items.
     lists = "\n  ".join(f"a{k} = [a{k - 1}, a{k - 1}]" for k in range(1, 40))
     with pytest.raises(ConfigError, match="got 10000 values in a class or list"):
