@@ -34,7 +34,8 @@ def test_import_config(terrainkit, rejected, tmp_path):
         "task.toml",
     ]
     (tmp_path / "my_config.py").write_text("class A:\n class terrain: mesh_type = 'trimesh'\n")
-    assert terrainkit(*"import-config my_config.py -o no_map".split()).stdout.splitlines() == [
+    run = terrainkit("import-config", "my_config.py", "-o", "no_map")
+    assert run.stdout.splitlines() == [
         "A: 1 of 1 settings taken; 0 make no difference here; 0 not taken",
         "wrote no_map: task.toml",
         "next: terrainkit train ROBOT --config no_map/task.toml",
