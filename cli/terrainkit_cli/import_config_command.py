@@ -39,6 +39,7 @@ class ImportConfig(Command):
     def run(self) -> int:
         """Import the configuration, and print what is not taken."""
         from terrainkit_robots.rl.import_config import import_config, write_config
+        from terrainkit_robots.rl.run import MAP_FILE
         from terrainkit_robots.rl.tasks import get_task
         from terrainkit_robots.spec.robot_arrays import Robot
 
@@ -48,7 +49,7 @@ class ImportConfig(Command):
         counts = [len(imported.taken), len(imported.without_effect), len(imported.listed)]
         render.result(
             f"{imported.name}: {counts[0]} of {sum(counts)} settings taken; {counts[1]} make no "
-            f"difference here; {counts[2]} not taken:"
+            f"difference here; {counts[2]} not taken{':' if imported.listed else ''}"
         )
         for reason in dict.fromkeys(imported.listed.values()):
             keys = (key for key, other in imported.listed.items() if other == reason)
@@ -56,7 +57,8 @@ class ImportConfig(Command):
         folder = quote(str(self.output))
         render.result(f"wrote {folder}: {listing(imported.files)}")
         on_plane = imported.taken.get("terrain.mesh_type", ("", "plane"))[1] == "plane"
-        terrain = "" if on_plane else f" --terrain {folder}/map.toml"
+        has_map = MAP_FILE in imported.files and not on_plane
+        terrain = f" --terrain {folder}/{MAP_FILE}" if has_map else ""
         trained = folder if robot else "ROBOT"
         render.result(f"next: terrainkit train {trained} --config {folder}/task.toml{terrain}")
         return 0

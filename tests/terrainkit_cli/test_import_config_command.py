@@ -33,6 +33,13 @@ def test_import_config(terrainkit, rejected, tmp_path):
         "robot.toml",
         "task.toml",
     ]
+    (tmp_path / "my_config.py").write_text("class A:\n class terrain: mesh_type = 'trimesh'\n")
+    run = terrainkit("import-config", "my_config.py", "-o", "no_map")
+    assert run.stdout.splitlines() == [
+        "A: 1 of 1 settings taken; 0 make no difference here; 0 not taken",
+        "wrote no_map: task.toml",
+        "next: terrainkit train ROBOT --config no_map/task.toml",
+    ]
     (tmp_path / "my_config.py").write_bytes(b"\xff")
     assert rejected("import-config my_config.py -o new").startswith("my_config.py: 'utf-8' codec")
     assert not (tmp_path / "new").exists()

@@ -63,7 +63,8 @@ def import_config(
         robot: The robot, whose joints and bodies some values need.
 
     Raises:
-        ConfigError: If the file cannot be read, or does not have one such class.
+        ConfigError: If the file cannot be read, does not have one such class, or the MJCF of the
+            robot does not load.
     """
     class_name, values = _read_settings(path, class_name)
     imported = ImportedConfig(name=class_name)
@@ -177,8 +178,9 @@ def _read_settings(path: Path, class_name: str) -> tuple[str, dict[str, Any]]:
     if chosen not in classes:
         got = class_name or f"{len(own)} classes"
         raise ConfigError(f"{path}: got {got}; expected --class, one of: {listing(classes)}")
-    pair = found[chosen], found.get(f"{chosen}{PPO}", {})
-    return chosen, {key: value for names in pair for key, value in flatten_class(names)}
+    pair = found[chosen], found.get(f"{chosen}{PPO}")
+    read = [part for part in pair if isinstance(part, Namespace)]
+    return chosen, {key: value for part in read for key, value in flatten_class(part)}
 
 
 def _robot_values(values: Mapping[str, Any], robot: Robot | None) -> dict[str, Any]:

@@ -110,9 +110,11 @@ def convert_value(row: Name, value: Any, settings: Values) -> Any:
         return row.values[str(value).lower()]
     try:
         converted = CONVERSIONS[row.how](value, settings)
-    except KeyError as error:
-        raise ConfigError(f"got {show(value)}; needs {error.args[0]}") from None
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        key = str(error.args[0]) if isinstance(error, KeyError) else ""
+        if "." in key or key in ("joints", "--robot"):
+            needed = "--robot" if key == "joints" else key
+            raise ConfigError(f"got {show(value)}; needs {needed}") from None
         raise ConfigError(f"got {show(value)}; expected a value as in legged_gym") from None
     if value and converted in ({}, []):
         raise ConfigError(f"got {show(value)}; the robot has none of these names")

@@ -117,9 +117,39 @@ def test_file_that_is_no_class(project, text, message):
         project(text)
 
 
+@pytest.mark.parametrize(("text", "listed"), read_table(__file__, "changed"))
+def test_changed_values_are_listed(project, text, listed):
+    assert project(text)[0].listed == listed
+
+
+@pytest.mark.parametrize("text", read_table(__file__, "read"))
+def test_values_that_are_read(project, text):
+    imported, files = project(text)
+    assert not imported.listed
+    assert files["task"]["env"]["num_envs"] == 8
+
+
+def test_imports_stay_in_the_project(project, tmp_path):
+    (tmp_path / "outside.py").write_text("n = 8\n")
+    text = "from outside import n\nclass A:\n class env:\n  num_envs = n\n"
+    text += f"from {'.' * 50} import x\nimport {'a' * 300}\nfrom {'a' * 300} import y\n"
+    assert project(text)[1]["task"]["env"]["num_envs"] == 8
+    (tmp_path / "legged" / ".git").mkdir()
+    assert project(text)[0].listed == {"env.num_envs": "not read: line 4: n"}
+
+
+def test_number_of_inherited_values_is_bounded(project):
+    values = "\n".join(f" a{k} = 0" for k in range(9000))
+    classes = "\n".join(f"class A{k}(A):\n pass" for k in range(100))
+    with pytest.raises(ConfigError, match="got more than 500000 values in all classes"):
+        project(f"class A:\n{values}\n{classes}\n")
+
+
 def test_large_values_are_not_computed(project):
     imported, _ = project("class A:\n class env:\n  num_envs = 9**9**9\n")
     assert imported.listed == {"env.num_envs": "not read: line 3: 9 ** 9 ** 9"}
+    imported, _ = project(f"class A:\n class env: num_envs = 0x1{'0' * 4500}")
+    assert imported.listed == {"env.num_envs": "not read: line 2: a number of too many digits"}
     # Each list has the one before it twice: 2^40 items.
     lists = "\n  ".join(f"a{k} = [a{k - 1}, a{k - 1}]" for k in range(1, 40))
     with pytest.raises(ConfigError, match="got 10000 values in a class or list"):
