@@ -59,4 +59,5 @@ def written(schema: Any) -> Any:
     return {
         key: NONE if key == "default" and value is None else written(value)
         for key, value in schema.items()
+        if (key, value) != ("default", {})  # msgspec 0.23 states it, and 0.22 does not
     }
