@@ -99,6 +99,12 @@ def test_spawn_height_names_feet_without_shapes(quadruped):
     assert check.measured.startswith("FL_foot has no shape, FR_foot 1.0 cm, ")
 
 
+def test_spawn_height_passes_without_feet(quadruped):
+    env = still_env(quadruped)
+    env.robot = replace(quadruped, spec=replace(quadruped.spec, feet=()))
+    assert module.check_spawn_height(env).passed
+
+
 def test_spawn_height_is_measured_at_the_lowest_corner(biped):
     assert module.check_spawn_height(still_env(biped)).passed
     pose = biped.spec.per_joint("default_pose")
