@@ -129,7 +129,8 @@ class LeggedEnv(VecEnv):
             history=self.history_length - 1,
             ngeom=self.scene.model.ngeom,
         )
-        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
+        velocity = np.where(robot.velocity > 0, robot.velocity, np.inf)
+        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads, velocity)
         self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
         self.curriculum = TerrainCurriculum(terrain, self.num_envs, task.terrain, task.runner.seed)
