@@ -35,6 +35,7 @@ from terrainkit_robots.policy.load_policy import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
 from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.estimator import ESTIMATE, EstimatorModel
 from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
@@ -42,7 +43,7 @@ from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import FloatArray
 
-ONNX_FILE, TORCHSCRIPT_FILE = "policy.onnx", "policy.pt"
+ONNX_FILE, TORCHSCRIPT_FILE, ESTIMATOR_FILE = "policy.onnx", "policy.pt", "estimator.onnx"
 
 FORMAT_VERSION, ONNX_OPSET = 2, 17
 """Version of the JSON, and an opset that runtimes on robots have."""
@@ -106,6 +107,7 @@ def export_policy(
             exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
     names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE]
+    names += [ESTIMATOR_FILE] if run.task.policy.estimator_hidden_dims else []
     names += [YAML_FILE] if deploy_yaml else []
     names += [EXAMPLE.name] if example else []
     files = tuple(folder / name for name in names)
@@ -123,6 +125,12 @@ def export_policy(
     order = observation_order(env)
     network = OnnxNetwork(actor, run.task.normalization, order)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
+    random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
+    obs = torch.cat([env.get_observations()["policy"], random])
+    description["estimator"] = None
+    if isinstance(actor, EstimatorModel):
+        description["estimator"], data = export_estimator(env, network, obs[:, order])
+        other_files[ESTIMATOR_FILE] = data
     text = json.dumps(description, indent=2) + "\n"
     metadata = {METADATA_KEY: text}
     notes = []
@@ -136,8 +144,6 @@ def export_policy(
         notes += _unknown_terms(contract)
     except ExportError as error:
         notes.append(f"{ONNX_FILE} has no {error}")
-    random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
-    obs = torch.cat([env.get_observations()["policy"], random])
     networks, errors = _export_networks(network, actor, obs, order, metadata)
     contents = {JSON_FILE: text.encode(), **networks, **other_files}
     if folder.is_dir():  # it may have other files
@@ -212,6 +218,26 @@ class OnnxNetwork(torch.nn.Module):
         return names | {"shape": list(states[0].shape)}
 
 
+class EstimatorNetwork(torch.nn.Module):
+    """The estimator of a policy, in the units of `policy.json`; see `OnnxNetwork`."""
+
+    scale: torch.Tensor
+    offset: torch.Tensor
+
+    def __init__(self, network: OnnxNetwork, scale: FloatArray, offset: FloatArray) -> None:
+        super().__init__()
+        self.register_buffer("scale", torch.from_numpy(scale))
+        self.register_buffer("offset", torch.from_numpy(offset))
+        self.network = network
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return the estimates for observations of the policy, shape (n, k)."""
+        model = self.network.model
+        latent = model.obs_normalizer(self.network.clip_obs(obs[:, self.network.indices]))
+        estimates: torch.Tensor = model.mlp.estimator(latent) / self.scale + self.offset
+        return estimates
+
+
 class ScriptNetwork(torch.nn.Module):
     """An actor with clipped observations and actions, which keeps its state; see `OnnxNetwork`."""
 
@@ -253,22 +279,66 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, 
         obs: Observations to trace it with, shape (n, k).
         metadata: Its metadata by key.
     """
-    file = io.BytesIO()
-    model = network.model
-    names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
-    _, *states = model.get_dummy_inputs()
+    source = network.model
+    _, *states = source.get_dummy_inputs()
     inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
-    axes = {name: {1: "batch"} for name in (*model.input_names, *model.output_names)}
-    axes |= {"obs": {0: "batch"}, "actions": {0: "batch"}}
-    # With `dynamo`, the export takes 5 s instead of 0.1 s.
-    torch.onnx.export(
-        network, inputs, file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
-    )
-    model = onnx.load_model_from_string(file.getvalue())
+    model = _trace(network, inputs, source.input_names, source.output_names)
     for key, value in metadata.items():
         model.metadata_props.add(key=key, value=value)
     onnx.checker.check_model(model)
     return bytes(model.SerializeToString())
+
+
+def export_estimator(
+    env: LeggedEnv, network: OnnxNetwork, obs: torch.Tensor
+) -> tuple[dict[str, Any], bytes]:
+    """Return the description of a policy's estimator, and its ONNX file.
+
+    Args:
+        env: The environment, whose group `estimate` has the values.
+        network: The policy, whose actor is an `EstimatorModel`.
+        obs: Exported observations to trace it with, shape (n, k).
+    """
+    parts: list[dict[str, Any]] = []
+    scales: list[FloatArray] = []
+    offsets: list[FloatArray] = []
+    start = 0
+    for name, term in env.obs_terms[ESTIMATE].items():
+        size = term.function(env).shape[1]
+        unit = term.unit if isinstance(term.unit, str) else list(term.unit)
+        parts.append({"name": name, "start": start, "stop": start + size, "unit": unit})
+        scales.append(np.broadcast_to(np.array(term.scale, np.float32), size))
+        offsets.append(np.broadcast_to(np.array(term.offset, np.float32), size))
+        start += size
+    estimator = EstimatorNetwork(network, np.concatenate(scales), np.concatenate(offsets))
+    with warnings.catch_warnings(), torch.no_grad():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        model = _trace(estimator, (obs,), ["obs"], ["estimates"])
+    return {"file": ESTIMATOR_FILE, "parts": parts}, bytes(model.SerializeToString())
+
+
+def _trace(
+    network: torch.nn.Module,
+    inputs: tuple[torch.Tensor, ...],
+    input_names: Sequence[str],
+    output_names: Sequence[str],
+) -> onnx.ModelProto:
+    """Return an ONNX model whose first input and output are (n, k), and others (layers, n, k)."""
+    file = io.BytesIO()
+    axes = {name: {1: "batch"} for name in (*input_names, *output_names)}
+    axes |= {input_names[0]: {0: "batch"}, output_names[0]: {0: "batch"}}
+    # With `dynamo`, the export takes 5 s instead of 0.1 s.
+    torch.onnx.export(
+        network,
+        inputs,
+        file,
+        input_names=input_names,
+        output_names=output_names,
+        dynamic_axes=axes,
+        opset_version=ONNX_OPSET,
+        dynamo=False,
+    )
+    return onnx.load_model_from_string(file.getvalue())
 
 
 def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:

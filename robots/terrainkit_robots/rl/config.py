@@ -430,6 +430,9 @@ class Policy(Config):
     """Widths of the hidden layers of the actor."""
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
+    estimator_hidden_dims: HiddenDims | None = None
+    """Widths of the hidden layers of an estimator of base linear velocity and foot contacts, which
+    is trained with the policy and whose estimates the policy observes; none for no estimator."""
     # torch computes elu seven times as slowly as swish on a CPU: it took 34 % of an update.
     activation: Activation = "swish"
     """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""

@@ -18,6 +18,7 @@ from terrainkit_robots.rl.actions import JointActions, checked_actions
 from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand, make_waypoints
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum, end_episodes, update_progress
+from terrainkit_robots.rl.estimator import ESTIMATE
 from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams
 from terrainkit_robots.rl.observations import ObservationTerm, PolicyInterface
 from terrainkit_robots.rl.own_terms import checked
@@ -217,11 +218,17 @@ class LeggedEnv(VecEnv):
         }
 
     def observation_terms(self) -> dict[str, dict[str, ObservationTerm]]:
-        """Return the terms of each observation group: `policy`, with noise, and `privileged`."""
-        return {
+        """Return the terms of each observation group: `policy`, with noise, and `privileged`.
+
+        With an estimator, the group `estimate` has what it predicts.
+        """
+        groups = {
             "policy": observations.policy_terms(self),
             "privileged": observations.privileged_terms(self),
         }
+        if self.cfg.policy.estimator_hidden_dims is not None:
+            groups[ESTIMATE] = observations.estimate_terms(self)
+        return groups
 
     def reward_terms(self) -> dict[str, Reward]:
         """Return the reward terms, whose scales are the fields of these names in the task."""
