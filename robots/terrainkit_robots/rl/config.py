@@ -227,7 +227,8 @@ class DomainRand(Config):
     # With legged_gym's 1 m/s, 2 of 21 quadrupeds fell at pushes of 1 m/s. With 1.25 m/s, the biped
     # fell twice as often in training as with 1 m/s.
     max_push_vel_xy: NonNegativeFloat | None = None
-    """Largest velocity that a push adds along x and along y [m/s]; none: 1.25, on two legs 0.75."""
+    """Largest velocity that a push adds along x and along y [m/s]; none: 0.6, on two legs 0.29,
+    times sqrt(g leg length)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -430,6 +431,9 @@ class Policy(Config):
     """Widths of the hidden layers of the actor."""
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
+    estimator_hidden_dims: HiddenDims | None = None
+    """Widths of the hidden layers of an estimator of base linear velocity and foot contacts, which
+    is trained with the policy and whose estimates the policy observes; none for no estimator."""
     # torch computes elu seven times as slowly as swish on a CPU: it took 34 % of an update.
     activation: Activation = "swish"
     """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""

@@ -141,12 +141,9 @@ def test_paper_obstacles_have_their_height_by_rays(name, terrain, difficulty, le
 
 
 def test_paper_openings_and_ramps_by_rays():
-    for difficulty, clearance, width in ((0.0, 0.5, 0.4), (1.0, 0.25, 0.24)):
+    for difficulty, clearance in ((0.0, 0.5), (1.0, 0.25)):
         bars = rays(one_patch("robot_parkour_learning", "crawl", difficulty), 0, None, 0.01, "up")
         assert np.nanmin(bars) == pytest.approx(clearance)
-        slit = rays(one_patch("robot_parkour_learning", "tilt", difficulty), 1, at=3.0)
-        assert lengths(slit < 0.1) == pytest.approx(width, abs=0.006)
-        assert slit.max() == pytest.approx(0.5)
     ramp = rays(one_patch("extreme_parkour", "side_ramps", 1.0), 1, at=3.2)
     on_ramp = ramp[20:-20][ramp[20:-20] > -0.5]  # without the rim of the pit
     assert [on_ramp.min(), on_ramp.max()] == pytest.approx([-0.25, 0.25], abs=2e-3)
