@@ -35,7 +35,7 @@ class GapTrack(SlotLane):
     """Maximum distance between two gaps, center to center [m]."""
 
     end: float = parameter.scalar(0.0)
-    """Minimum length of the flat end [m]."""
+    """Length of the flat end, where the patch is long enough [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the gaps."""
@@ -49,4 +49,4 @@ class GapTrack(SlotLane):
         """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.min_spacing, self.max_spacing
         length = grid.length(grid.cells(self.length))
-        return self.slots(grid, spacing, element="gaps", length=length, end=self.end)
+        return self.slots(grid, spacing, element="gaps", length=length, preferred_end=self.end)
