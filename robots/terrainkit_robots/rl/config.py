@@ -329,6 +329,9 @@ class Rewards(Config):
     tracking_sigma: PositiveFloat = 0.06
     """Width of the wide kernel of the tracking rewards, exp(-error^2 / sigma), at zero command
     [m2/s2]; otherwise it is proportional to the squared command."""
+    tracking_in_gait: bool = False
+    """Whether the tracking rewards are paid only while the contacts of all feet agree with the
+    gait."""
     # Without the limit of 9 cm, anymal_c, with legs of 0.64 m, swung its feet 12 cm high.
     swing_height: PositiveFloat | None = None
     """Height of a swinging foot above the ground, as a fraction of the leg length; none: 0.18, on

@@ -188,10 +188,16 @@ def default_task(spec: RobotSpec) -> Task:
     )
     if not is_biped:
         return task
-    # With the tracking rewards and the entropy of `biped`, which commands slower, g1 followed 24 %
-    # of faster commands after 8.0 M samples, and all with these. Without an estimator, h1 stood
-    # for 1.8 s after 3.1 M samples; with one, for 13 s.
-    tracking = replace(task.rewards, tracking_lin_vel=3.0, tracking_ang_vel=1.5, progress=1.0)
+    # Without an estimator, h1 stood for 1.8 s after 3.1 M samples. If tracking is paid out of step,
+    # it takes 1.6 steps/s with 6 cm of swing and falls on 9 of 44 commands after 6.5 M; in step
+    # only, 1.1 steps/s with 13 cm, and no falls.
+    tracking = replace(
+        task.rewards,
+        tracking_lin_vel=3.0,
+        tracking_ang_vel=1.5,
+        progress=1.0,
+        tracking_in_gait=True,
+    )
     return replace(
         task,
         rewards=tracking,

@@ -84,6 +84,7 @@ def test_folder_of_a_biped_estimates_its_velocity_and_tracks_it_more():
     biped = get_task("biped")
     task = get_task(biped.folder).task
     assert task.policy.estimator_hidden_dims
+    assert task.rewards.tracking_in_gait
     assert not task.observations.base_lin_vel
     assert task.rewards.feet_gait == biped.task.rewards.feet_gait
     for name in ("tracking_lin_vel", "tracking_ang_vel", "progress"):
