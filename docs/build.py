@@ -363,7 +363,7 @@ def examples_page() -> str:
 
 EXAMPLES = """Each example is a program of at most 90 lines. It runs as it is, in any folder, and
 writes its files to that folder. In a clone: `python docs/examples/generate_map.py`.
-The tests run the eight that need only terrainkit as they are, and the tasks of `gait_commands` and
+The tests run the nine that need only terrainkit as they are, and the tasks of `gait_commands` and
 `teacher_student`; `make integrations` runs those of frameworks, each in its framework.
 [terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.
 """

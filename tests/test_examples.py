@@ -24,6 +24,7 @@ WRITTEN = {
     "own_solids": ("logs.png", "logs.xml"),
     "import_scan": ("scan.npz", "scan.ply", "scan.png"),
     "height_scan": (),
+    "plan_path": ("map.yaml", "map.pgm", "plan.png"),
     "near_geoms": (),
     "depth_camera": (),
     "onboard_robot": ("my_robot/robot.toml", "my_robot/mjlab_config.py"),

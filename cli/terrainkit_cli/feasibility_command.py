@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
 from terrainkit.map.layout import column_types
@@ -19,6 +19,7 @@ from terrainkit_cli.argument_types import (
     OutputPath,
     RobotName,
     parse_pairs,
+    parse_range,
 )
 from terrainkit_cli.parse import value_of
 from terrainkit_cli.plugin_command import PluginCommand
@@ -161,9 +162,7 @@ def solve_demand(
     from terrainkit.feasibility.report import demand_text
     from terrainkit.feasibility.solve import solve_ranges
 
-    ends: Any = tuple(value_of(text) for text in demand.split(":"))
-    if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
-        raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
+    ends = parse_range("--demand", demand, "0.2:0.9")
     derived = robot_limits(robot, limits)
     terrains, columns = config.sub_terrains, column_types(config)
     if config.mode != "randomized":  # sub-terrains of a preset without a column are not solved
