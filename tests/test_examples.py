@@ -77,7 +77,8 @@ def test_example_runs_in_an_empty_folder(name, tmp_path):
     for file in WRITTEN[name]:
         assert (tmp_path / file).stat().st_size > 100
     for picture in tmp_path.glob("*.png"):
-        assert cv2.imread(str(picture)).std() > 5
+        is_of_heights = picture.with_suffix(".json").exists()
+        assert is_of_heights or cv2.imread(str(picture)).std() > 5
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)

@@ -67,16 +67,20 @@ routes = []
 for row, col in np.ndindex(terrain_map.difficulty.shape):
     goals = terrain_map.goals[row, col, :, :2]
     stops = [terrain_map.env_origins[row, col, :2], *goals[~np.isnan(goals[:, 0])]]
-    for start, goal in itertools.pairwise(stops):
+    for number, (start, goal) in enumerate(itertools.pairwise(stops), start=1):
         path = plan(free, cell_at(start), cell_at(goal))
         if path is None:
             print(f"building ({row}, {col}): no path to {goal.round(2)}")
             continue
         points = np.asarray(grid.lower) + (np.array(path) + 0.5) * grid.cell
-        routes.append(Route(points=points, place=None, label="", is_passable=True))
+        mark = tuple(points[-1].tolist())
+        routes.append(Route(points=points, place=mark, label=f"{number}", is_passable=True))
     print(f"building ({row}, {col}): {len(stops) - 1} goals")
 
 print(f"{occupied.mean():.0%} of the cells are occupied, {len(routes)} paths")
 # Nav2 reads map.yaml, which has the same cells.
 terrain_map.save("map.yaml", height_band=(LOW, HIGH), overwrite=True)
-print("wrote map.yaml and", write_preview(terrain_map, "plan.png", routes=routes, overwrite=True))
+print(
+    "wrote map.yaml and",
+    write_preview(terrain_map, "plan.png", routes=routes, storey=0, overwrite=True),
+)

@@ -113,11 +113,13 @@ def to_json(
 
 def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
     """Return the paths and blocking places for `terrainkit.views.preview.write_preview`."""
+    over = f"> {MAX_DEMAND:g}"
     return [
         Route(
             points=patch.path[:, :2],
-            place=tuple(patch.place[:2].tolist()) if patch.limit else None,
-            label=demand_text(patch.demand),
+            # Without a limit, there is no demand or no path: the mark is at the start.
+            place=tuple((patch.place if patch.limit else patch.path[0])[:2].tolist()),
+            label=demand_text(patch.demand).replace("inf", over if patch.limit else "no path"),
             is_passable=patch.is_passable,
         )
         for patch in results

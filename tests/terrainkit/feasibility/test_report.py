@@ -97,4 +97,6 @@ def test_routes_have_path_mark_and_label():
     easy, lost = routes([EASY, LOST])
     assert easy.points.tolist() == [[0.0, 2.0], [2.0, 2.0]]
     assert (easy.place, easy.label, easy.is_passable) == ((1.0, 2.00004), "0.75", True)
-    assert (lost.place, lost.label, lost.is_passable) == (None, "inf", False)
+    assert (lost.place, lost.label, lost.is_passable) == ((0.0, 2.0), "no path", False)
+    (far,) = routes([replace(EASY, demand=np.inf)])
+    assert (far.place, far.label) == ((1.0, 2.00004), "> 2")
