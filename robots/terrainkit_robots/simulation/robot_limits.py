@@ -69,7 +69,7 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
     if not spec.feet:
         raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
     leg, foot = _length(spec, "leg_length"), _length(spec, "foot_radius")
-    width, height = _extents(spec, folder / spec.mjcf)
+    length, width, height = _extents(spec, folder / spec.mjcf)
     about_leg = f"leg_length ({leg:g} m)"
     values = {
         "step_up": (STEP_UP * leg, f"{STEP_UP:g} x {about_leg}"),
@@ -84,6 +84,7 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
             max(height - CROUCH * leg, height / 2),
             f"standing_height - {CROUCH:g} x {about_leg}, at least half of it",
         ),
+        "body_length": (length, "length of the collision shapes in the default pose"),
     }
     limits = RobotLimits(**{name: round(value, 6) for name, (value, _) in values.items()})
     reasons = {name: reason for name, (_, reason) in values.items()}
@@ -102,8 +103,8 @@ def _length(spec: RobotSpec, name: str) -> float:
     return float(value)
 
 
-def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
-    """Return the width and the height of the collision shapes in the default pose [m]."""
+def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float]:
+    """Return length, width and height of the collision shapes in the default pose [m]."""
     import mujoco
 
     if not mjcf.is_file():
@@ -124,5 +125,5 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
     geoms = np.flatnonzero(collides(model) & (model.geom_bodyid > 0))
     if not len(geoms):
         raise ConfigError("mjcf: got a robot without collision geoms; expected at least one")
-    _, width, height = np.ptp(box_corners(model, data, geoms), axis=0).tolist()
-    return width, height
+    length, width, height = np.ptp(box_corners(model, data, geoms), axis=0).tolist()
+    return length, width, height

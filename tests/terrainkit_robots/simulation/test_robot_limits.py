@@ -14,7 +14,8 @@ def test_limits_of_the_quadruped_by_hand():
     """Legs of 0.448 m, feet of 0.022 m, and 0.328 m from hip to hip; it stands 0.4 m high."""
     derived = derive_limits(FOLDER / "quadruped")
     expected = read_table(__file__, "limits_of_the_quadruped_by_hand")
-    assert vars(derived.limits) == pytest.approx(expected, abs=5e-3)  # the pose may change
+    # The pose may change.
+    assert vars(derived.limits) == pytest.approx(expected | {"turning_width": None}, abs=5e-3)
     assert set(derived.reasons) == set(expected)
     assert derived.reasons["step_up"] == "0.4 x leg_length (0.448 m)"
 
