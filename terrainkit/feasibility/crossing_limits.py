@@ -20,6 +20,9 @@ Limit = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
 _WALKING = {"step_down": 1.25, "slope": 0.64, "foothold": 3.2}
 """Walking limits, in limits of the robot."""
 
+_MAX_WALKING_FOOTHOLD = 0.28
+"""Foothold to which the margin extends, at most [m]: treads of stairs are footholds."""
+
 _WALKING_CLEARANCES = (1.3, 1.05)
 """Clearances below which walking demands something, and above which robots walk upright, in
 standing heights. The policies do not crouch, and the body moves up and down."""
@@ -87,13 +90,16 @@ class RobotLimits(Config):
         """
         length = self.body_length or self.body_width
         upright, lowest = _WALKING_CLEARANCES
+        factors = {name: factor * getattr(self, name) for name, factor in _WALKING.items()}
+        foothold = max(self.foothold, min(factors.pop("foothold"), _MAX_WALKING_FOOTHOLD))
         return replace(
             self,
+            foothold=foothold,
             body_width=self.body_width * math.cos(_WALKING_YAW) + length * math.sin(_WALKING_YAW),
             turning_width=math.hypot(length, self.body_width),
             standing_height=upright * self.standing_height,
             crouched_height=lowest * self.standing_height,
-            **{name: factor * getattr(self, name) for name, factor in _WALKING.items()},
+            **factors,
         )
 
 

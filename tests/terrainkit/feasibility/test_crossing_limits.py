@@ -32,6 +32,9 @@ def test_walking_limits_by_hand():
     walking = replace(LIMITS, body_length=0.3).walking()
     assert (walking.turning_width, walking.step_up, walking.gap) == pytest.approx((0.5, 0.2, 0.4))
     assert walking.step_down == pytest.approx(1.25 * 0.25)
+    # The margin of footholds ends at treads of stairs.
+    footholds = [replace(LIMITS, foothold=size).walking().foothold for size in (0.05, 0.1, 0.3)]
+    assert footholds == pytest.approx([0.16, 0.28, 0.3])
     assert 0.4 < walking.body_width < 0.5
     assert LIMITS.walking().turning_width == pytest.approx(0.4 * 2**0.5)
     # Robots do not walk upright where they just fit: below 1.05 x 0.6 m, the demand is above 1.
