@@ -34,6 +34,7 @@ from terrainkit.terrain.overlay import Overlay as Overlay
 from terrainkit.terrain.registry import register_overlay as register_overlay
 from terrainkit.terrain.registry import register_terrain as register_terrain
 from terrainkit.terrain.sub_terrain import SubTerrain as SubTerrain
+from terrainkit.terrain.worker_pool import worker_pool as worker_pool
 from terrainkit.viewer.map_scene import show_map as show_map
 from terrainkit.views.preview import write_preview as write_preview
 

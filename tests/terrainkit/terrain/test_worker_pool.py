@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from terrainkit.terrain import plugin_file
-from terrainkit_cli.worker_pool import worker_pool
+from terrainkit.terrain.worker_pool import worker_pool
 
 
 def test_worker_pool_of_one_is_this_process():
