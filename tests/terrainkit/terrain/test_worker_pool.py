@@ -1,5 +1,6 @@
 import multiprocessing
 import os
+import time
 
 import cv2
 import numpy as np
@@ -37,3 +38,9 @@ def test_worker_pool_imports_plugin_files_in_processes_that_are_not_forked(tmp_p
             assert executor.submit(plugin_file.plugin_files).result() == (path,)
     finally:
         multiprocessing.set_start_method(method, force=True)
+
+
+def test_worker_pool_does_not_wait_for_work_that_has_not_started():
+    with worker_pool(2) as executor:
+        futures = [executor.submit(time.sleep, 0.1) for _ in range(100)]
+    assert futures[-1].cancelled()
