@@ -23,6 +23,7 @@ from terrainkit.map.patch import Patch as Patch
 from terrainkit.map.patch import PatchParameters as PatchParameters
 from terrainkit.map.patch import make_patch as make_patch
 from terrainkit.map.terrain_map import TerrainMap as TerrainMap
+from terrainkit.map.terrain_stream import TerrainStream as TerrainStream
 from terrainkit.suites import Suite as Suite
 from terrainkit.suites import generate_suite as generate_suite
 from terrainkit.suites import get_suite as get_suite

@@ -22,7 +22,7 @@ def worker_pool(jobs: int) -> "Iterator[Executor | None]":
         jobs: Number of processes.
 
     Yields:
-        The executor, such as for `generate`; None for 1 job, which is this process.
+        The executor, for `generate` and `TerrainStream`; None for 1 job, which is this process.
     """
     if jobs == 1:
         yield None
