@@ -188,8 +188,10 @@ def papers_page() -> str:
 
 PAPERS = """Presets with the terrains of papers and projects. `terrainkit list --papers` prints the
 citations, `terrainkit list PRESET` a preset, and `terrainkit generate --preset PRESET` generates
-it. The figures were read in the code or the tables of the work, and the tests compare each with the
-generated terrain. Figures of terrains marked second-hand were read in the work of others. A preset
+it. Where the code of a work is public, its own functions were run, and the tests compare the ground
+that they build with ours: platforms, number and height of rises, gaps, levels and columns. What
+remains is under "Different". The other figures were read in papers; those of terrains marked
+second-hand, in the work of others. A preset
 sets the terrains only; `terrainkit list PRESET` prints the options for a map of the size of the
 work. In Python, `terrainkit.terrain.paper.get_paper` returns an entry. The pictures show difficulty
 0, 0.5 and 1, from left to right.

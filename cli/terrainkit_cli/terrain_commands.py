@@ -96,7 +96,9 @@ def _print_preset(name: str) -> None:
         f" --{key.replace('_', '-')} {' '.join(map(format_value, np.atleast_1d(value).tolist()))}"
         for key, value in (paper.map.items() if paper else ())
     )
-    render.result(f"terrainkit generate --preset {name}{options} -o map.npz")
+    command = f"terrainkit generate --preset {name}{options} -o map.npz"
+    lines = textwrap.wrap(command, 96, subsequent_indent="    ", break_on_hyphens=False)
+    render.result(" \\\n".join(lines))
     render.result("")
     rows = [("terrain", "proportion", "parameters")]
     for sub_terrain in presets.get_preset(name):

@@ -2,12 +2,16 @@
 
 import importlib.util
 import os
+from importlib import metadata
 
 from terrainkit.errors import ConfigError, install_command
 from terrainkit.files.memory import check_address_space
 
-PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
-"""Packages that training imports; MuJoCo has `batch` since version 3.17."""
+PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard")
+"""Packages that training imports, besides MuJoCo."""
+
+_OLDEST = {"mujoco": "3.17", "rsl-rl-lib": "5.5"}
+"""Oldest versions of packages that frameworks pin, as in pyproject.toml: `mujoco.batch` is new."""
 
 _ADDRESS_SPACE = 1_300_000_000
 """Addresses that the packages need [bytes]; with fewer, some of them end the process."""
@@ -21,12 +25,19 @@ def require_training(*packages: str, extra: str = "train") -> None:
         extra: The extra that has all of the packages.
 
     Raises:
-        ConfigError: if a package is missing.
+        ConfigError: if a package is missing or too old.
         MemoryLimitError: if torch cannot be imported in the address space (`ulimit -v`).
     """
     missing = [name for name in (*PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(f"missing packages: {', '.join(missing)}; run: {install_command(extra)}")
+    for package, oldest in _OLDEST.items():
+        found = metadata.version(package)
+        if [int(part) for part in found.split(".")[:2]] < [int(part) for part in oldest.split(".")]:
+            raise ConfigError(
+                f"{package}: got version {found}; expected {oldest} or newer; where a framework "
+                f"pins an older one, use an environment of its own: {install_command(extra)}"
+            )
     check_address_space(_ADDRESS_SPACE, "importing torch and MuJoCo")
     # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

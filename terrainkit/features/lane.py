@@ -31,6 +31,7 @@ class Lane(Terrain):
         element: str,
         length: float,
         end: float = 0.0,
+        preferred_end: float = 0.0,
     ) -> NDArray[np.float64]:
         """Return the edges of as many equal slots as fit behind the start [m], shape (n + 1,).
 
@@ -43,13 +44,15 @@ class Lane(Terrain):
             element: Name of the elements, for the error message.
             length: Length of the longest element along x [m].
             end: Minimum length of the flat end [m].
+            preferred_end: Length of the flat end where the patch is long enough [m].
 
         Raises:
             ConfigError: if elements could overlap, or none fits.
         """
         low, high = spacing
         first = grid.length(grid.cells(self.start))
-        number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
+        room, pitch = grid.size[0] - first + 1e-9, (low + high) / 2
+        number = min((room - end) / pitch, max(1.0, (room - preferred_end) / pitch))
         if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
             raise ConfigError(
                 f"{self.kind()}: got {element} {length:g} m long with a spacing of {low:g} m to "
@@ -57,7 +60,7 @@ class Lane(Terrain):
                 f"{element} shorter than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch "
                 f"{grid.size[0]:g} m long"
             )
-        return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
+        return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * pitch
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,7 @@ class PitLane(SlotLane):
     """Depth of the pit [m]."""
 
     end: float
-    """Minimum length along x behind the last element, with its gap [m]."""
+    """Length along x behind the last element, with its gap, where the patch has room [m]."""
 
     def pit_slots(
         self, grid: Grid, spacing: tuple[float, float], *, element: str, length: float
@@ -53,8 +53,10 @@ class PitLane(SlotLane):
 
         The arguments are the same as in `slots`.
         """
-        end = max(self.end, self.gap + grid.cell)
-        return self.slots(grid, spacing, element=element, length=length, end=end)
+        end = self.gap + grid.cell
+        return self.slots(
+            grid, spacing, element=element, length=length, end=end, preferred_end=self.end
+        )
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""

@@ -14,6 +14,7 @@ from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
 from terrainkit.geometry.rectangle_decomposition import Span, decompose_rectangles
 from terrainkit.geometry.walls import WallRule, flat_corners
+from terrainkit.settings.text import short_repr
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
@@ -39,6 +40,8 @@ class BoxDecomposition:
 
     Boxes may overlap below the surface: pyramid stairs are a stack of one box per step.
     """
+
+    __repr__ = short_repr
 
     centers: NDArray[np.float64]
     """Center of each box [m], shape (n, 3)."""

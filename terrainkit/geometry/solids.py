@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.settings.text import short_repr
 from terrainkit.settings.type_hint import MAX_VALUE
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ class Solids:
     Arrays over all n solids list the boxes first, then the cylinders, then the hulls. Use
     `make_boxes`, `make_cylinders` and `make_hulls` to create solids.
     """
+
+    __repr__ = short_repr
 
     boxes: NDArray[np.float32]
     """Center [m], half size along the axes of the box [m], quaternion (w, x, y, z); (nb, 10)."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, listing
 from terrainkit.geometry.grid import Grid, whole_cells
 from terrainkit.settings.schema import Config
+from terrainkit.settings.text import short_repr
 from terrainkit.settings.toml_text import parse_toml
 from terrainkit.settings.type_hint import (
     MAX_VALUE,
@@ -28,6 +29,9 @@ from terrainkit.terrain.sub_terrain import SubTerrain, UnavailableSubTerrain
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""
 
+_SLOPE_THRESHOLD = float("0.75")
+"""The default of `slope_threshold`, which is known by its identity from a 0.75 that is given."""
+
 Mode = Literal["curriculum", "selected", "randomized", "custom"]
 
 
@@ -38,6 +42,8 @@ class MapConfig(Config):
     Raises:
         ConfigError: if a value is invalid; the message names the field.
     """
+
+    __repr__ = short_repr
 
     rows: Count = 10
     """Patches along x; in a curriculum, the difficulty levels."""
@@ -91,8 +97,9 @@ class MapConfig(Config):
     centered: bool = False
     """Put (0, 0) at the center of the map, as in Isaac Lab, not at the corner of patch (0, 0)."""
 
-    slope_threshold: Size | None = 0.75
-    """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""
+    slope_threshold: Size | None = _SLOPE_THRESHOLD
+    """Slope between two samples above which the ground becomes a vertical wall; none: no walls. The
+    preset `stairs` has a default of its own, 0.2, so that all of its steps are vertical."""
 
     spawns_per_patch: Count = 1
     """Number of spawn positions of a patch, including the origin; fewer where the level ground
@@ -123,6 +130,9 @@ class MapConfig(Config):
         super().__post_init__()
         if self.terrains:
             object.__setattr__(self, "preset", "")
+        elif self.slope_threshold is _SLOPE_THRESHOLD:
+            threshold = presets.slope_threshold(self.preset, _SLOPE_THRESHOLD)
+            object.__setattr__(self, "slope_threshold", threshold)
         self._check_grid()
         self._check_sub_terrains()
 

@@ -25,6 +25,7 @@ from terrainkit.map.layout import (
 )
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.spawn import SpawnGround
+from terrainkit.settings.text import short_repr
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.overlay import Overlay
@@ -77,6 +78,8 @@ class PatchParameters:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patch:
     """One patch of a map, in the frame of the map."""
+
+    __repr__ = short_repr
 
     terrain: str
     """Name of the sub-terrain, which may differ from the name of its terrain."""

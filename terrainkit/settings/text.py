@@ -1,6 +1,8 @@
 """Text of numbers in XML, and of names in messages, such as the nearest to a misspelled one."""
 
 from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
 
 from terrainkit.errors import listing
 
@@ -19,6 +21,18 @@ def truncate(text: str, max_length: int = MAX_LENGTH) -> str:
 def format_numbers(*values: float) -> str:
     """Return numbers with up to six decimals, separated by spaces."""
     return " ".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in values)
+
+
+def short_repr(instance: Any) -> str:
+    """Return a dataclass's `repr` with the shapes of arrays, and without values by default."""
+    parts = []
+    for each in fields(instance):
+        value = getattr(instance, each.name)
+        if hasattr(value, "shape"):
+            parts.append(f"{each.name}: {value.shape}")
+        elif value != each.default:
+            parts.append(f"{each.name}={truncate(repr(value))}")
+    return f"{type(instance).__name__}({', '.join(parts)})"
 
 
 def closest(word: str, names: Iterable[str], min_ratio: float = MIN_RATIO) -> str:

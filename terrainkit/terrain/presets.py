@@ -43,11 +43,21 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
     return tuple(_sub_terrain(key, values) for key, values in _presets()[name].items())
 
 
+def slope_threshold(name: str, default: float) -> float:
+    """Return the slope above which the ground of a preset becomes a wall, or the default."""
+    threshold: float = _tables()["slope_thresholds"].get(name, default)
+    return threshold
+
+
+@cache
+def _tables() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("presets.toml").read_text(encoding="utf-8"))
+
+
 @cache
 def _presets() -> dict[str, dict[str, Mapping[str, Any]]]:
     """Return the keys of each sub-terrain of the presets in presets.toml."""
-    text = Path(__file__).with_name("presets.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    table = _tables()
     presets: dict[str, dict[str, Mapping[str, Any]]] = table["presets"]
     for name, stairs in table["built_stairs"].items():
         code = {"terrain": "staircase", **stairs["code"]}

@@ -34,6 +34,9 @@ class GapTrack(SlotLane):
     max_spacing: float = parameter.size(2.2)
     """Maximum distance between two gaps, center to center [m]."""
 
+    end: float = parameter.scalar(0.0)
+    """Length of the flat end, where the patch is long enough [m]."""
+
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the gaps."""
         ground = np.zeros(grid.shape)
@@ -46,4 +49,4 @@ class GapTrack(SlotLane):
         """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.min_spacing, self.max_spacing
         length = grid.length(grid.cells(self.length))
-        return self.slots(grid, spacing, element="gaps", length=length)
+        return self.slots(grid, spacing, element="gaps", length=length, preferred_end=self.end)

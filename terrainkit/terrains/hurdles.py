@@ -41,6 +41,9 @@ class Hurdles(SlotLane):
     max_spacing: float = parameter.size(2.2)
     """Maximum distance between two hurdles, center to center [m]."""
 
+    end: float = parameter.scalar(0.0)
+    """Length of the flat end, where the patch is long enough [m]."""
+
     top: str = parameter.choice("flat", "round")
     """Shape of the top."""
 
@@ -77,4 +80,4 @@ class Hurdles(SlotLane):
         """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.min_spacing, self.max_spacing
         length = max(self.min_thickness, self.max_thickness)
-        return self.slots(grid, spacing, element="hurdles", length=length)
+        return self.slots(grid, spacing, element="hurdles", length=length, preferred_end=self.end)

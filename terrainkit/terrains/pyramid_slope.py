@@ -28,14 +28,17 @@ class PyramidSlope(Terrain):
     platform: float = parameter.platform(3.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
+    rim: float = parameter.length(0.0, allow_zero=True)
+    """Width of the flat ground at the edge of the patch [m]."""
+
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slopes, which fall by `grade * cell` from ring to ring."""
         platform = grid.centered(self.platform)
-        run = min(grid.margin(platform))
-        if run == 0:
+        run = min(grid.margin(platform)) - grid.cells(self.rim, minimum=0)
+        if run <= 0:
             raise ConfigError(
                 f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"

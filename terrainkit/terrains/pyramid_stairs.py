@@ -15,8 +15,9 @@ from terrainkit.terrain import Terrain, parameter
 class PyramidStairs(Terrain):
     """Square steps of constant height and width around a central platform.
 
-    The outermost tread is at height 0. It is at least as wide as the others, since it takes the
-    remaining cells. On a patch that is not square, the shorter side determines the number of steps.
+    The outermost tread is at height 0. It is at least as wide as the others, or as `rim`, since it
+    takes the remaining cells. On a patch that is not square, the shorter side determines the number
+    of steps.
     """
 
     has_random_heights: ClassVar[bool] = False
@@ -31,6 +32,9 @@ class PyramidStairs(Terrain):
     platform: float = parameter.platform(3.0)
     """Side of the flat square at the center [m]."""
 
+    rim: float = parameter.length(0.0, allow_zero=True)
+    """Smallest width of the outermost tread [m]; 0 for that of a step."""
+
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
@@ -38,8 +42,9 @@ class PyramidStairs(Terrain):
         """Return the treads, counted outward from the platform."""
         width = grid.cells(self.step_width)
         platform = grid.centered(self.platform)
-        risers = min(grid.margin(platform)) // width
-        if risers == 0:
+        rim = grid.cells(self.rim, minimum=0) or width
+        risers = 1 + (min(grid.margin(platform)) - rim) // width
+        if risers < 1:
             raise ConfigError(
                 f"{self.kind()}: no step of {self.step_width:g} m fits between the platform of "
                 f"{self.platform:g} m and the edge of a patch of "

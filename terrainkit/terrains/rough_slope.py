@@ -34,10 +34,14 @@ class RoughSlope(RoughGround):
     platform: float = parameter.platform(3.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
+    top: float = parameter.length(0.0, allow_zero=True)
+    """Side of the square at which the slope ends [m], if that is longer than `platform`."""
+
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slope plus noise, which fades to 0 at the platform."""
-        slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
+        top = max(self.top, self.platform)
+        slope = PyramidSlope(grade=self.grade, platform=top, inverted=self.inverted)
         return slope.heights(grid, rng) + self.noise(grid, rng)

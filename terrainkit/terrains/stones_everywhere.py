@@ -27,7 +27,7 @@ class StonesEverywhere(PitTerrain):
     """Side of a stone [m]."""
 
     gap: float = parameter.size(0.04, 0.26)
-    """Gap between neighboring stones without offsets [m]."""
+    """Mean gap between neighboring stones [m]; offsets change it by up to twice `shift`."""
 
     shift: float = parameter.height(0.018, 0.118)
     """Largest offset of a stone along x and along y [m]."""

@@ -37,6 +37,7 @@ PACKAGES = {
         ["torch==2.8.0", "genesis-world==0.3.14"],
         ["wandb", "tensorboard", "pandas", "xlsxwriter", "pygame", "warp-lang"],
     ],
+    "works": [["torch", "trimesh", "scipy", "mujoco", "pandas"]],
     "legged_gym": [["torch==2.4.1", "numpy<1.24", "scipy", "matplotlib", "tensorboard"]],
 }
 """Arguments of `pip install` for each check."""
@@ -47,6 +48,9 @@ environment, in which terrainkit is not installed."""
 
 PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12", "drake": "3.12"}
 """Version of Python of an environment, where it is not the version that runs this program."""
+
+FOLDERS = CHECKOUTS | {"works": "WORKS"}
+"""Variable with the folder that a check needs."""
 
 KEPT = ("mjlab", "isaaclab3")
 """Environments in which an installation of terrainkit must not change another package."""
@@ -72,8 +76,8 @@ def main() -> None:
     arguments = parser.parse_args()
     failed = []
     for name in arguments.names:
-        if CHECKOUTS.get(name, "PATH") not in os.environ:
-            print(f"{name}: not run; set {CHECKOUTS[name]} to the folder of a checkout")
+        if FOLDERS.get(name, "PATH") not in os.environ:
+            print(f"{name}: not run; set {FOLDERS[name]} to the folder of a checkout")
             continue
         version = PYTHONS.get(name)
         interpreter = find_python(version) if version else sys.executable

@@ -69,6 +69,16 @@ def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command
     assert rejected(f"{command} quadruped").startswith(told)
 
 
+def test_training_commands_name_a_pinned_package(rejected, monkeypatch):
+    version = importlib.metadata.version
+    older = {"rsl-rl-lib": "5.4.2"}
+    monkeypatch.setattr(
+        importlib.metadata, "version", lambda name: older.get(name) or version(name)
+    )
+    told = "rsl-rl-lib: got version 5.4.2; expected 5.5 or newer; where a framework pins an older"
+    assert rejected("evaluate quadruped").startswith(told)
+
+
 @pytest.mark.parametrize(
     "words", [("generat",), ("generate", "-o", "a.npz", "--rows", 0), ("train", "quadrupd")]
 )

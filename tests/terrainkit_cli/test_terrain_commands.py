@@ -1,11 +1,20 @@
+import json
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.map.layout import column_types, terrain_and_difficulty
 from terrainkit.terrain import registry
 from terrainkit.terrain.paper import paper_names
+from terrainkit_cli.generate_command import Generate
 from tests.tables import read_table
+
+WORKS = json.loads((Path(__file__).parents[1] / "terrainkit/terrain/works.json").read_text())
 
 
 def test_list_names_every_terrain(terrainkit):
@@ -24,10 +33,31 @@ def test_list_papers_has_the_citations_in_100_columns(terrainkit, monkeypatch):
     lines = terrainkit("list", "--papers").stdout.splitlines()
     assert {*paper_names()} < {*lines}
     assert "    (2023), arXiv:2309.14341" in lines
-    assert any("hurdles height=0.15:0.4," in line for line in lines)
+    assert any("height=0.15:0.4," in line for line in lines)
     for name in paper_names():
         lines += terrainkit("list", name).stdout.splitlines()
     assert max(map(len, lines)) <= 100
+
+
+@pytest.mark.parametrize("name", sorted(WORKS))
+def test_list_prints_the_command_for_the_map_of_a_work(terrainkit, name):
+    text = terrainkit("list", name).stdout.replace("\\\n", "")
+    (line,) = [each for each in text.splitlines() if each.startswith("terrainkit generate")]
+    config = Generate.parse(shlex.split(line)[2:]).changed_config()
+    layout = WORKS[name]["layout"]
+    assert config.rows == layout["rows"]
+    assert config.cell <= layout["cell"]
+    assert list(config.patch_size) == layout.get("patch_size", [12.8, 1.6])
+    assert config.cols == layout.get("cols", config.cols)
+    if layout.get("columns") == "random":
+        assert (config.mode, np.mean(config.random_difficulties)) == ("randomized", 0.5)
+        return
+    columns = column_types(config)
+    names = [config.sub_terrains[column].name for column in columns]
+    assert names == layout.get("columns", names)
+    exact = replace(config, difficulty_jitter=0.0)
+    levels = [terrain_and_difficulty(exact, columns, row, 0)[1] for row in range(config.rows)]
+    assert levels == pytest.approx(layout["levels"], abs=1e-3)
 
 
 def test_list_papers_with_a_name_is_an_error(terrainkit):

@@ -35,6 +35,7 @@ from terrainkit_robots.policy.load_policy import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
 from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.estimator import ESTIMATE, EstimatorModel
 from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
@@ -42,7 +43,7 @@ from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import FloatArray
 
-ONNX_FILE, TORCHSCRIPT_FILE = "policy.onnx", "policy.pt"
+ONNX_FILE, TORCHSCRIPT_FILE, ESTIMATOR_FILE = "policy.onnx", "policy.pt", "estimator.onnx"
 
 FORMAT_VERSION, ONNX_OPSET = 2, 17
 """Version of the JSON, and an opset that runtimes on robots have."""
@@ -106,6 +107,7 @@ def export_policy(
             exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
     names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE]
+    names += [ESTIMATOR_FILE] if run.task.policy.estimator_hidden_dims else []
     names += [YAML_FILE] if deploy_yaml else []
     names += [EXAMPLE.name] if example else []
     files = tuple(folder / name for name in names)
@@ -123,6 +125,12 @@ def export_policy(
     order = observation_order(env)
     network = OnnxNetwork(actor, run.task.normalization, order)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
+    random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
+    obs = torch.cat([env.get_observations()["policy"], random])
+    description["estimator"] = None
+    if isinstance(actor, EstimatorModel):
+        description["estimator"], data = export_estimator(env, network, obs[:, order])
+        other_files[ESTIMATOR_FILE] = data
     text = json.dumps(description, indent=2) + "\n"
     metadata = {METADATA_KEY: text}
     notes = []
@@ -136,8 +144,6 @@ def export_policy(
         notes += _unknown_terms(contract)
     except ExportError as error:
         notes.append(f"{ONNX_FILE} has no {error}")
-    random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
-    obs = torch.cat([env.get_observations()["policy"], random])
     networks, errors = _export_networks(network, actor, obs, order, metadata)
     contents = {JSON_FILE: text.encode(), **networks, **other_files}
     if folder.is_dir():  # it may have other files
@@ -212,6 +218,26 @@ class OnnxNetwork(torch.nn.Module):
         return names | {"shape": list(states[0].shape)}
 
 
+class EstimatorNetwork(torch.nn.Module):
+    """The estimator of a policy, in the units of `policy.json`; see `OnnxNetwork`."""
+
+    scale: torch.Tensor
+    offset: torch.Tensor
+
+    def __init__(self, network: OnnxNetwork, scale: FloatArray, offset: FloatArray) -> None:
+        super().__init__()
+        self.register_buffer("scale", torch.from_numpy(scale))
+        self.register_buffer("offset", torch.from_numpy(offset))
+        self.network, self.model = network, network.model
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return the estimates for observations of the policy, shape (n, k)."""
+        clipped = self.network.clip_obs(obs[:, self.network.indices])
+        estimates = self.model.mlp.estimator(self.model.obs_normalizer(clipped))
+        result: torch.Tensor = estimates / self.scale + self.offset
+        return result
+
+
 class ScriptNetwork(torch.nn.Module):
     """An actor with clipped observations and actions, which keeps its state; see `OnnxNetwork`."""
 
@@ -245,30 +271,68 @@ def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     return results
 
 
-def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, str]) -> bytes:
-    """Return a policy as an ONNX file.
+def export_onnx(
+    network: torch.nn.Module,
+    obs: torch.Tensor,
+    metadata: Mapping[str, str],
+    output: str = "actions",
+) -> bytes:
+    """Return a network as an ONNX file.
 
     Args:
-        network: The network.
+        network: An `OnnxNetwork` or `EstimatorNetwork`.
         obs: Observations to trace it with, shape (n, k).
         metadata: Its metadata by key.
+        output: Name of the first output.
     """
     file = io.BytesIO()
-    model = network.model
-    names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
+    model: Any = network.model
+    inputs, outputs = model.input_names, [output, *model.output_names[1:]]
     _, *states = model.get_dummy_inputs()
-    inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
-    axes = {name: {1: "batch"} for name in (*model.input_names, *model.output_names)}
-    axes |= {"obs": {0: "batch"}, "actions": {0: "batch"}}
+    axes = {name: {1: "batch"} for name in (*inputs, *outputs)}
+    axes |= {"obs": {0: "batch"}, output: {0: "batch"}}
     # With `dynamo`, the export takes 5 s instead of 0.1 s.
     torch.onnx.export(
-        network, inputs, file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
+        network,
+        (obs, *(state.repeat(1, len(obs), 1) for state in states)),
+        file,
+        input_names=inputs,
+        output_names=outputs,
+        dynamic_axes=axes,
+        opset_version=ONNX_OPSET,
+        dynamo=False,
     )
     model = onnx.load_model_from_string(file.getvalue())
     for key, value in metadata.items():
         model.metadata_props.add(key=key, value=value)
     onnx.checker.check_model(model)
     return bytes(model.SerializeToString())
+
+
+def export_estimator(
+    env: LeggedEnv, network: OnnxNetwork, obs: torch.Tensor
+) -> tuple[dict[str, Any], bytes]:
+    """Return the description of a policy's estimator, and its ONNX file.
+
+    Args:
+        env: The environment, whose group `estimate` has the values.
+        network: The policy, whose actor is an `EstimatorModel`.
+        obs: Exported observations to trace it with, shape (n, k).
+    """
+    parts = _observation_parts(env, ESTIMATE)
+    scale, offset = (
+        np.concatenate([np.array(part[key], np.float32) for part in parts])
+        for key in ("scale", "offset")
+    )
+    estimator = EstimatorNetwork(network, scale, offset)
+    with warnings.catch_warnings(), torch.no_grad():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        data = export_onnx(estimator, obs, {}, "estimates")
+    keys = "name", "start", "stop", "unit"
+    return {
+        "file": ESTIMATOR_FILE,
+        "parts": [{key: part[key] for key in keys} for part in parts],
+    }, data
 
 
 def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
@@ -410,12 +474,14 @@ def observation_order(env: LeggedEnv) -> NDArray[np.int64]:
     )
 
 
-def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
+def _terms(
+    env: LeggedEnv, group: str = "policy"
+) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
     """Yield name, term, first number in an observation of `env`, size and steps of each term."""
     start = 0
     steps = env.history_length
-    has_history = "history" in env.obs_terms["policy"]
-    for name, term in env.obs_terms["policy"].items():
+    has_history = "history" in env.obs_terms[group]
+    for name, term in env.obs_terms[group].items():
         size = term.function(env).shape[1]
         if name == "history":  # of the terms before it
             has_history = False
@@ -424,11 +490,11 @@ def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int
         start += size
 
 
-def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
+def _observation_parts(env: LeggedEnv, group: str = "policy") -> list[dict[str, Any]]:
     """Return slice, steps of the history, unit, offset, scale and clip of each term."""
     parts = []
     first = 0
-    for name, term, _, size, history in _terms(env):
+    for name, term, _, size, history in _terms(env, group):
         part: dict[str, Any] = {"name": name, "start": first, "stop": first + size * history}
         part["history"] = history
         part["unit"] = term.unit if isinstance(term.unit, str) else list(term.unit)

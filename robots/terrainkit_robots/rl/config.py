@@ -227,7 +227,8 @@ class DomainRand(Config):
     # With legged_gym's 1 m/s, 2 of 21 quadrupeds fell at pushes of 1 m/s. With 1.25 m/s, the biped
     # fell twice as often in training as with 1 m/s.
     max_push_vel_xy: NonNegativeFloat | None = None
-    """Largest velocity that a push adds along x and along y [m/s]; none: 1.25, on two legs 0.75."""
+    """Largest velocity that a push adds along x and along y [m/s]; none: 0.6, on two legs 0.29,
+    times sqrt(g leg length)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -328,6 +329,9 @@ class Rewards(Config):
     tracking_sigma: PositiveFloat = 0.06
     """Width of the wide kernel of the tracking rewards, exp(-error^2 / sigma), at zero command
     [m2/s2]; otherwise it is proportional to the squared command."""
+    tracking_in_gait: bool = False
+    """Whether the tracking rewards are paid only while the contacts of all feet agree with the
+    gait."""
     # Without the limit of 9 cm, anymal_c, with legs of 0.64 m, swung its feet 12 cm high.
     swing_height: PositiveFloat | None = None
     """Height of a swinging foot above the ground, as a fraction of the leg length; none: 0.18, on
@@ -430,6 +434,9 @@ class Policy(Config):
     """Widths of the hidden layers of the actor."""
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
+    estimator_hidden_dims: HiddenDims | None = None
+    """Widths of the hidden layers of an estimator of base linear velocity and foot contacts, which
+    is trained with the policy and whose estimates the policy observes; none for no estimator."""
     # torch computes elu seven times as slowly as swish on a CPU: it took 34 % of an update.
     activation: Activation = "swish"
     """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""

@@ -18,6 +18,7 @@ from terrainkit_robots.rl.actions import JointActions, checked_actions
 from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand, make_waypoints
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum, end_episodes, update_progress
+from terrainkit_robots.rl.estimator import ESTIMATE
 from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams
 from terrainkit_robots.rl.observations import ObservationTerm, PolicyInterface
 from terrainkit_robots.rl.own_terms import checked
@@ -129,7 +130,8 @@ class LeggedEnv(VecEnv):
             history=self.history_length - 1,
             ngeom=self.scene.model.ngeom,
         )
-        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
+        velocity = np.where(robot.velocity > 0, robot.velocity, np.inf)
+        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads, velocity)
         self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
         self.curriculum = TerrainCurriculum(terrain, self.num_envs, task.terrain, task.runner.seed)
@@ -216,11 +218,17 @@ class LeggedEnv(VecEnv):
         }
 
     def observation_terms(self) -> dict[str, dict[str, ObservationTerm]]:
-        """Return the terms of each observation group: `policy`, with noise, and `privileged`."""
-        return {
+        """Return the terms of each observation group: `policy`, with noise, and `privileged`.
+
+        With an estimator, the group `estimate` has what it predicts.
+        """
+        groups = {
             "policy": observations.policy_terms(self),
             "privileged": observations.privileged_terms(self),
         }
+        if self.cfg.policy.estimator_hidden_dims is not None:
+            groups[ESTIMATE] = observations.estimate_terms(self)
+        return groups
 
     def reward_terms(self) -> dict[str, Reward]:
         """Return the reward terms, whose scales are the fields of these names in the task."""

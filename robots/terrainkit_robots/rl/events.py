@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 MAX_RESET_RELIEF = 0.06
 """Height range of the ground under a robot that is not reset exactly at its origin [m]."""
 
-MAX_PUSH, BIPED_MAX_PUSH = 1.25, 0.75
-"""Default of the largest velocity that a push adds along x and along y [m/s]."""
+MAX_PUSH, BIPED_MAX_PUSH = 0.6, 0.29
+"""Default of the largest velocity that a push adds along x and along y, in units of
+sqrt(g leg length): 1.26 m/s for the bundled quadruped, 0.75 m/s for two legs of 0.7 m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,9 +173,10 @@ def push(env: "LeggedEnv") -> None:
     """Add a velocity to the robots that are due, at regular intervals."""
     env.push_vel[:] = 0
     if interval := push_interval(env):
-        default = BIPED_MAX_PUSH if len(env.robot.spec.feet) == 2 else MAX_PUSH
-        setting = env.cfg.domain_rand.max_push_vel_xy
-        limit = default if setting is None else setting
+        limit = env.cfg.domain_rand.max_push_vel_xy
+        if limit is None:
+            share = BIPED_MAX_PUSH if len(env.robot.spec.feet) == 2 else MAX_PUSH
+            limit = share * float(np.sqrt(9.81 * env.robot.leg_length))
         env.steps_until_push -= 1
         env_ids = np.flatnonzero(env.steps_until_push <= 0)
         if len(env_ids):

@@ -197,6 +197,19 @@ def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     }
 
 
+def estimate_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
+    """Return the terms that an estimator predicts: base linear velocity and foot contacts."""
+    scale = env.cfg.normalization.obs_scales.lin_vel
+    return {
+        "base_lin_vel": ObservationTerm(
+            lambda env: env.state.base_lin_vel, "vector", scale, unit="m/s"
+        ),
+        "foot_contact": ObservationTerm(
+            lambda env: env.state.foot_contact.astype("f4"), "contacts"
+        ),
+    }
+
+
 def _push_vel(env: "LeggedEnv") -> FloatArray:
     return quat_rotate_inverse(env.state.base_quat, env.push_vel)
 

@@ -130,7 +130,11 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
     only_yaw = is_moving(commands) & (squares[0] == 0)
-    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(turns_little, lin, 1)
+    lin, yaw = lin * np.where(only_yaw, yaw, 1), yaw * np.where(turns_little, lin, 1)
+    if env.cfg.rewards.tracking_in_gait:
+        in_gait = (env.state.foot_contact == (env.state.swing_phase == 0)).all(axis=1)
+        return lin * in_gait, yaw * in_gait
+    return lin, yaw
 
 
 def tracking_lin_vel(env: "LeggedEnv") -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.files.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -16,15 +16,24 @@ from terrainkit_robots.spec.robot_arrays import Robot
 
 Ids = NDArray[np.int64]
 
+SPEED_AT_EFFORT = 0.9
+"""Share of a joint's speed limit up to which its motor has the whole effort. From there, the torque
+falls to zero at the limit, as for a DC motor whose stall torque is ten times the effort."""
+
 
 class Simulation:
     """n simulations of a scene; its arrays are views that change with every step."""
 
     after_step: Callable[[], object] | None = None
-    """Called after every physics step; None to step without interruption, which is faster."""
+    """Called after every physics step."""
 
-    def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
-        """Allocate the simulations in the model's default state."""
+    def __init__(
+        self, scene: Scene, num_envs: int, num_threads: int = 0, velocity: ArrayLike = np.inf
+    ) -> None:
+        """Allocate the simulations in the model's default state.
+
+        `velocity` has the speed limit of each joint [rad/s or m/s], shape (j,).
+        """
         warnings = (f"mjWARN_BAD{name}" for name in ("QPOS", "QVEL", "QACC", "CTRL"))
         self._unstable = [int(getattr(mujoco.mjtWarning, name)) for name in warnings]
         self._stage = mujoco.mjtStage.mjSTAGE_VEL
@@ -32,6 +41,9 @@ class Simulation:
         self.batch = Batch(scene.model, num_envs, num_threads)
         names = ("qpos", "qvel", "ctrl", "actuator_force", "sensordata")
         self.qpos, self.qvel, self.ctrl, self.torque, self._sensordata = map(self.batch.bind, names)
+        self._max_speed = np.asarray(velocity, float)
+        self._effort = scene.model.actuator_forcerange[:, 1]
+        self._forcerange = self.batch.expand("actuator_forcerange")
         near = scene.near_geoms
         self._update_geoms = near.bind(self.batch) if near else None
 
@@ -46,11 +58,22 @@ class Simulation:
         # A reset also restores the counters, so only counts that start at 0 are reliable.
         self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():
-            for _ in range(count if self.after_step else 1):
-                self.batch.step(nstep=1 if self.after_step else count, stage=self._stage)
+            for k in range(count):
+                self._limit_torques()
+                # Sensors of the steps between cost a quarter of a step.
+                is_read = self.after_step is not None or k == count - 1
+                stage = self._stage if is_read else mujoco.mjtStage.mjSTAGE_NONE
+                self.batch.step(nstep=1, stage=stage)
                 if self.after_step:
                     self.after_step()
         return (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
+
+    def _limit_torques(self) -> None:
+        """Reduce the largest torques in the direction of motion near the speed limits."""
+        speed = self.qvel[:, self.scene.joint_qvel] / self._max_speed
+        share = np.clip((1 - np.abs(speed)) / (1 - SPEED_AT_EFFORT), 0, 1)
+        self._forcerange[:, :, 0] = -self._effort * np.where(speed < 0, share, 1)
+        self._forcerange[:, :, 1] = self._effort * np.where(speed > 0, share, 1)
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Reset some simulations.

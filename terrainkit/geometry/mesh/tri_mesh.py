@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.settings.text import short_repr
+
 EDGES_PER_BLOCK = 1 << 20
 """Edges that are compared at once, to bound the memory."""
 
@@ -12,6 +14,8 @@ EDGES_PER_BLOCK = 1 << 20
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TriMesh:
     """A triangle mesh."""
+
+    __repr__ = short_repr
 
     vertices: NDArray[np.float32]
     """Positions [m], shape (nv, 3)."""

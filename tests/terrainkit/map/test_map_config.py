@@ -1,9 +1,10 @@
 import math
+from dataclasses import replace
 
 import pytest
 
-from terrainkit import MapConfig, SubTerrain
-from terrainkit.errors import ConfigError
+from terrainkit import MapConfig, SubTerrain, generate, make_boxes
+from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.terrain import presets
 from tests.tables import read_table
 
@@ -64,6 +65,24 @@ def test_wall_threshold_includes_rounding_tolerance():
     wall = MapConfig(slope_threshold=0.5, cell=0.2, border=0.0).wall_threshold
     assert wall == pytest.approx(0.10001, abs=1e-9)
     assert MapConfig(slope_threshold=None).wall_threshold == math.inf
+
+
+def test_preset_stairs_has_a_threshold_of_its_own():
+    """Its lowest steps, of 0.05 m on cells of 0.1 m, are vertical: 0.5 is above 0.2."""
+    config = MapConfig(preset="stairs", rows=1, cols=1, border=1.0)
+    with pytest.warns(TerrainkitWarning, match="no column|cliffs"):
+        terrain_map = generate(config)
+    assert terrain_map.height([[1.999, 4.0], [2.001, 4.0]]) == pytest.approx([0.0, 0.05])
+    assert MapConfig(preset="rough").slope_threshold == 0.75
+    assert MapConfig.from_toml('preset = "stairs"').slope_threshold == 0.2
+    assert MapConfig(preset="stairs", slope_threshold=0.75).slope_threshold == 0.75
+    assert replace(MapConfig(), preset="stairs").slope_threshold == 0.2
+
+
+def test_repr_has_what_is_not_the_default_and_shapes():
+    assert repr(MapConfig(preset="rough", rows=2)) == "MapConfig(rows=2, preset='rough')"
+    boxes = make_boxes([[0.0, 0.0, 0.5]], size=(1.0, 1.0, 1.0))
+    assert repr(boxes).startswith("Solids(boxes: (1, 10), cylinders: (0, 10)")
 
 
 def test_map_side_is_limited_to_a_million_cells():

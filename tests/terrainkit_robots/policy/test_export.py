@@ -26,7 +26,7 @@ from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.policy.open_policy import open_policy
 from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import Control, Env, Observations, Task
+from terrainkit_robots.rl.config import Control, Env, Observations, Policy, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
@@ -256,6 +256,30 @@ def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
     order = observation_order(env)
     assert sorted(order) == list(range(150))
     assert order[:9].tolist() == [100, 101, 102, 50, 51, 52, 0, 1, 2]
+
+
+def test_exported_estimator_has_si_units(make_run, tmp_path):
+    run = make_run(policy=Policy(estimator_hidden_dims=(8,)))
+    runner = LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder)
+    runner.learn(1)
+    result = export_policy(open_run(run.folder), tmp_path / "exported")
+    assert tmp_path / "exported" / "estimator.onnx" in result.files
+    described = json.loads((tmp_path / "exported" / "policy.json").read_text())["estimator"]
+    assert described == {
+        "file": "estimator.onnx",
+        "parts": [
+            {"name": "base_lin_vel", "start": 0, "stop": 3, "unit": "m/s"},
+            {"name": "foot_contact", "start": 3, "stop": 7, "unit": "1"},
+        ],
+    }
+    obs = runner.env.get_observations()
+    session = onnxruntime.InferenceSession(tmp_path / "exported" / "estimator.onnx")
+    exported = obs["policy"].numpy()[:, observation_order(runner.env)]
+    estimates = session.run(["estimates"], {"obs": exported})[0]
+    # The task observes velocities times 2.
+    runner.alg.actor.eval()
+    expected = runner.alg.actor.estimate(obs).detach().numpy() / [2, 2, 2, 1, 1, 1, 1]
+    np.testing.assert_allclose(estimates, expected, atol=1e-5)
 
 
 def test_example_has_the_joints_and_friction_of_the_training(exported, trained, monkeypatch):

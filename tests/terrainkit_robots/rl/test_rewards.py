@@ -231,6 +231,16 @@ def test_failing_reward_of_another_package_is_named(result, told):
         function(None)
 
 
+@pytest.mark.parametrize("name", ["tracking_lin_vel", "tracking_ang_vel"])
+def test_tracking_in_gait_is_paid_while_all_feet_agree_with_it(name, robot):
+    # The second foot is to swing: neither, only the first, only the second, and both agree.
+    force = np.zeros((4, 2, 3))
+    force[:, :, 2] = [[0, 9], [9, 9], [0, 0], [9, 0]]
+    given = state(4, swing_phase=np.array([[0, 0.5]] * 4), foot_force=force)
+    assert rewarded(name, robot, given, tracking_in_gait=True).tolist() == [0, 0, 0, 1]
+    assert rewarded(name, robot, given).tolist() == [1] * 4
+
+
 def test_tiny_tracking_sigma_pays_nothing(robot):
     given = state(2, mean_vel=[[1.0, 0, 0], [0, 0, 0]])
     assert paid("tracking_lin_vel", robot, given, tracking_sigma=1e-12) == [0, 1]

@@ -14,6 +14,7 @@ from terrainkit.errors import ConfigError, PluginError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Algorithm, Policy, Task, Termination
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.estimator import estimator_update
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
 from terrainkit_robots.rl.symmetry import has_symmetry
@@ -43,11 +44,13 @@ def differences(a, b, path=""):
     return [] if same or path == ".logger.tot_time" else [path]
 
 
-@pytest.mark.parametrize("kind", ["plane", "map", "stuck"])
+@pytest.mark.parametrize("kind", ["plane", "map", "stuck", "estimator"])
 def test_resuming_continues_exactly(make, task, tmp_path, map_ground, kind):
     ground = None
     if kind == "stuck":
         task = replace(task, termination=Termination(stuck_time=0.1))
+    if kind == "estimator":
+        task = replace(task, policy=Policy(estimator_hidden_dims=(8,)))
     if kind == "map":
         commands = replace(task.commands, heading_command=True)
         terrain = replace(task.terrain, curriculum="learning_progress")
@@ -273,6 +276,38 @@ def test_samples_mirrored_once_update_as_those_of_each_mini_batch(make):
     assert set(once.alg.storage.observations.keys()) == {"policy", "privileged"}
 
 
+def test_estimator_learns_and_ppo_leaves_it_alone(make, task):
+    task = replace(task, policy=replace(task.policy, estimator_hidden_dims=(16,)))
+    runner = make(task, folder=None)
+    runner.learn(1)
+    obs, actor = runner.alg.storage.observations.flatten(0, 1), runner.alg.actor
+    start = (actor.estimate(obs) - obs["estimate"]).square().mean()
+    runner.alg.update = dict
+    update = estimator_update(runner.alg, lambda obs: obs)
+    losses = [update()["estimator"] for _ in range(30)]
+    assert losses[-1] < 0.5 * start < 0.6 * losses[0]
+    assert {group["lr"] for group in runner.alg.optimizer.param_groups} == {
+        runner.alg.learning_rate
+    }
+    actions = actor(obs).sum()
+    weights = [*actor.estimator.parameters()]
+    assert torch.autograd.grad(actions, weights, allow_unused=True) == (None,) * len(weights)
+
+
+def test_policy_observes_simulated_values_at_first(make, task):
+    task = replace(task, policy=replace(task.policy, estimator_hidden_dims=(16,)))
+    runner = make(task, folder=None)
+    obs, actor = runner.env.get_observations(), runner.alg.actor
+    width = obs["estimate"].shape[1]
+    simulated, estimated = obs["estimate"], actor.estimate(obs)
+    for share, expected in [(1, simulated), (0.25, 0.25 * simulated + 0.75 * estimated)]:
+        actor.forced.fill_(share)
+        torch.testing.assert_close(actor.get_latent(obs)[:, -width:], expected)
+    actor.eval()
+    torch.testing.assert_close(actor.get_latent(obs)[:, -width:], estimated)
+    assert width == 7
+
+
 def test_mixed_precision_changes_little_and_keeps_single_precision(make, task):
     settings = (
         Algorithm(schedule="fixed", use_mixed_precision=is_mixed) for is_mixed in (True, False)
@@ -302,12 +337,13 @@ def test_runner_config_has_the_tasks_values():
 TWO_PROCESSES = """
 import os, sys
 from pathlib import Path
-from terrainkit_robots.rl.config import Env, Runner, Task
+from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.train import train
 
 out = Path(sys.argv[1])
 runner = Runner(num_steps_per_env=8, max_iterations=2)
-task = Task(env=Env(num_envs=5, episode_length_s=0.3), runner=runner)
+env, policy = Env(num_envs=5, episode_length_s=0.3), Policy(estimator_hidden_dims=(8,))
+task = Task(env=env, policy=policy, runner=runner)
 trained = train("quadruped", "plane", task, folder=out / "run")
 import torch
 torch.save(

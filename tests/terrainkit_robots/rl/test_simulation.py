@@ -51,6 +51,22 @@ class TestSimulation:
         np.testing.assert_array_equal(sim.qpos[[0, 2]], untouched)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(
+    ("speed", "share"), [(0, 1), (0.8, 1), (0.95, 0.5), (1.0, 0), (1.5, 0), (-1.5, 1)]
+)
+def test_torque_falls_to_zero_at_the_speed_limit(quadruped, nominal_task, direction, speed, share):
+    scene = Scene(quadruped, Plane(), nominal_task())
+    sim = Simulation(scene, 1, 1, quadruped.velocity)
+    qpos, qvel = scene.default_qpos[None].copy(), np.zeros((1, scene.model.nv))
+    qpos[:, 2] = 5
+    qvel[:, scene.joint_qvel] = direction * speed * quadruped.velocity
+    sim.reset(np.arange(1), qpos, qvel)
+    sim.ctrl[:] = direction * 1000  # the motors give all they can
+    sim.step(1)
+    np.testing.assert_allclose(sim.torque[0], direction * share * quadruped.effort, rtol=1e-4)
+
+
 class TestUnstable:
     @pytest.mark.parametrize(
         ("array", "value"), [("ctrl", np.nan), ("qpos", np.inf), ("qvel", 1e12), ("qvel", -1e12)]

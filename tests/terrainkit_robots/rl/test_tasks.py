@@ -80,15 +80,28 @@ def test_get_task_accepts_a_folder(tmp_path, monkeypatch, kind):
     assert get_task("quadruped").folder == QUADRUPED
 
 
-def test_folder_of_a_biped_observes_its_velocity_and_tracks_it_more():
+def test_folder_of_a_biped_estimates_its_velocity_and_tracks_it_more():
     biped = get_task("biped")
     task = get_task(biped.folder).task
-    assert task.observations.base_lin_vel
-    assert not biped.task.observations.base_lin_vel
+    assert task.policy.estimator_hidden_dims
+    assert task.rewards.tracking_in_gait
+    assert not task.observations.base_lin_vel
     assert task.rewards.feet_gait == biped.task.rewards.feet_gait
     for name in ("tracking_lin_vel", "tracking_ang_vel", "progress"):
         assert getattr(task.rewards, name) == 2 * getattr(biped.task.rewards, name)
-    assert task.commands == Task().commands != biped.task.commands
+    assert task.commands == biped.task.commands
+    assert task.env == Task().env != biped.task.env
+
+
+def test_commands_of_a_folder_are_scaled_to_the_legs(tmp_path):
+    text = (QUADRUPED / "robot.toml").read_text()
+    (tmp_path / "robot.toml").write_text(text.replace("leg_length = 0.448", "leg_length = 0.112"))
+    task = get_task(tmp_path).task
+    # A quarter of the length: half of the velocity, and twice the yaw rate.
+    assert (task.commands.lin_vel_x, task.commands.lin_vel_y) == ((-0.5, 0.5), (-0.25, 0.25))
+    assert (task.commands.ang_vel_yaw, task.commands.min_norm) == ((-2.0, 2.0), 0.1)
+    assert (task.init_state.lin_vel, task.domain_rand.com_shift) == (0.25, 0.007)
+    assert task.rewards.tracking_sigma == pytest.approx(0.015)
 
 
 def test_unknown_task_lists_known_ones(tmp_path):
