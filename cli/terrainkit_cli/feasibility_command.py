@@ -11,6 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.map.layout import column_types
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain.worker_pool import worker_pool
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
     Jobs,
@@ -23,7 +24,6 @@ from terrainkit_cli.argument_types import (
 )
 from terrainkit_cli.parse import value_of
 from terrainkit_cli.plugin_command import PluginCommand
-from terrainkit_cli.worker_pool import worker_pool
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
