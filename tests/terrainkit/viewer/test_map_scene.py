@@ -122,6 +122,7 @@ def test_camera_has_a_box_in_view(size):
     assert side == pytest.approx(0.85)
 
 
+@pytest.mark.filterwarnings("ignore:cells of 0.1 m:terrainkit.TerrainkitWarning")
 def test_labels_are_beside_the_patches_of_a_map_without_solids(server, shown):
     show_map(server, make_map("legged_gym"))
     labels = {name: call for name, call in shown.items() if "/labels/" in name}
