@@ -365,7 +365,7 @@ def examples_page() -> str:
 
 EXAMPLES = """Each example is a program of at most 90 lines. It runs as it is, in any folder, and
 writes its files to that folder. In a clone: `python docs/examples/generate_map.py`.
-The tests run the eight that need only terrainkit as they are, and the tasks of `gait_commands` and
+The tests run the nine that need only terrainkit as they are, and the tasks of `gait_commands` and
 `teacher_student`; `make integrations` runs those of frameworks, each in its framework.
 [terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.
 """
@@ -534,7 +534,63 @@ def draw_perception() -> None:
         shown = cv2.normalize(values, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
         views.append(cv2.applyColorMap(shown, cv2.COLORMAP_VIRIDIS))
     views[1][~edges.is_foothold(xy, 0.03)] = (60, 60, 220)
+    column = np.linspace(-0.7, 0.7, 480)  # the tangent of the angle is linear
+    azimuth = np.degrees(np.arctan(np.tan(0.7) * column / 0.7))
+    elevation = np.degrees(np.arctan(np.tan(0.7) * np.linspace(0.75, -0.75, 360))) - 6
+    near, far = float(depth.min()), float(depth[np.isfinite(depth)].max())
+    views[0] = with_axes(
+        views[0],
+        f"depth: {near:.1f} m (yellow) to {far:.0f} m, none (violet)",
+        ("angle to the left [deg]", -azimuth, (40, 20, 0, -20, -40)),
+        ("elevation [deg]", elevation, (20, 0, -20, -40)),
+    )
+    views[1] = with_axes(
+        views[1],
+        f"distance to an edge: 0 to {edges.distance(xy).max():.1f} m (yellow); red: no foothold",
+        ("y [m]", y[0], (6, 5, 4, 3, 2)),
+        ("x [m]", x[:, 0], (8, 7, 6, 5, 4)),
+    )
     cv2.imwrite(str(PICTURES / "perception.png"), np.hstack(views))
+
+
+def with_axes(
+    picture: NDArray[np.uint8],
+    title: str,
+    across: tuple[str, NDArray[np.float64], tuple[float, ...]],
+    down: tuple[str, NDArray[np.float64], tuple[float, ...]],
+) -> NDArray[np.uint8]:
+    """Return a picture with a title, and axes to the left and below.
+
+    Args:
+        picture: The picture, shape (height, width, 3).
+        title: Text above it.
+        across: Label of the horizontal axis, its value in each column, and its ticks.
+        down: Label of the vertical axis, its value in each row, and its ticks.
+    """
+    left, above, below = 50, 50, 44
+    height, width = picture.shape[:2]
+    size = ((above, below), (left, 12), (0, 0))
+    framed = np.pad(picture, size, constant_values=255)
+
+    def write(text: str, x: int, y: int) -> None:
+        cv2.putText(
+            framed, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (40, 40, 40), 1, cv2.LINE_AA
+        )
+
+    write(title, left, 16)
+    label, values, ticks = down
+    write(label, 4, above - 10)
+    for tick in ticks:
+        row = above + int(np.abs(values - tick).argmin())
+        cv2.line(framed, (left - 5, row), (left, row), (40, 40, 40))
+        write(f"{tick:g}", 8, min(row + 5, above + height))
+    label, values, ticks = across
+    write(label, left + width // 2 - 60, above + height + 36)
+    for tick in ticks:
+        column = left + int(np.abs(values - tick).argmin())
+        cv2.line(framed, (column, above + height), (column, above + height + 5), (40, 40, 40))
+        write(f"{tick:g}", column - 8, above + height + 20)
+    return framed
 
 
 def draw_robot(name: str) -> None:

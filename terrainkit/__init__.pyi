@@ -23,6 +23,7 @@ from terrainkit.map.patch import Patch as Patch
 from terrainkit.map.patch import PatchParameters as PatchParameters
 from terrainkit.map.patch import make_patch as make_patch
 from terrainkit.map.terrain_map import TerrainMap as TerrainMap
+from terrainkit.map.terrain_stream import TerrainStream as TerrainStream
 from terrainkit.suites import Suite as Suite
 from terrainkit.suites import generate_suite as generate_suite
 from terrainkit.suites import get_suite as get_suite
@@ -34,6 +35,7 @@ from terrainkit.terrain.overlay import Overlay as Overlay
 from terrainkit.terrain.registry import register_overlay as register_overlay
 from terrainkit.terrain.registry import register_terrain as register_terrain
 from terrainkit.terrain.sub_terrain import SubTerrain as SubTerrain
+from terrainkit.terrain.worker_pool import worker_pool as worker_pool
 from terrainkit.viewer.map_scene import show_map as show_map
 from terrainkit.views.preview import write_preview as write_preview
 

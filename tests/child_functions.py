@@ -100,7 +100,7 @@ def start_child():
 
 
 def start_workers():
-    from terrainkit_cli.worker_pool import worker_pool
+    from terrainkit.terrain.worker_pool import worker_pool
 
     with worker_pool(2) as executor:
         executor.submit(int).result()

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit_cli.parse import option, positional
+from terrainkit_cli.parse import option, positional, value_of
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
@@ -93,3 +93,20 @@ def parse_pairs(option: str, texts: Sequence[str], sep: str, expected: str) -> d
             raise ConfigError(f"{option}: got {name} twice; expected each name once")
         pairs[name] = value
     return pairs
+
+
+def parse_range(option: str, text: str, example: str) -> tuple[float, float]:
+    """Return the numbers of an option LOW:HIGH.
+
+    Args:
+        option: Name of the option.
+        text: Its value.
+        example: A valid value, for error messages.
+
+    Raises:
+        ConfigError: if the text has another format.
+    """
+    ends: Any = tuple(value_of(end) for end in text.split(":"))
+    if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
+        raise ConfigError(f"{option}: got {text!r}; expected LOW:HIGH, such as {example}")
+    return ends[0], ends[1]

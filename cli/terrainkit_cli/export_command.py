@@ -10,7 +10,13 @@ from terrainkit.export import export_files
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Checkpoint, OutputPath, TaskFile, is_map
+from terrainkit_cli.argument_types import (
+    Checkpoint,
+    OutputPath,
+    TaskFile,
+    is_map,
+    parse_range,
+)
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
@@ -57,9 +63,9 @@ class Export(PluginCommand):
     """For .stl, .ply and .obj: rotate the map so that y is up, as game engines expect; .glb always
     has y up."""
 
-    max_step: Annotated[float, option("M")] | None = None
-    """For .yaml: height of the largest step that a robot takes, by default 0.2 [m]; cells at the
-    top of higher ones are occupied."""
+    height_band: Annotated[str, option("LOW:HIGH")] = ""
+    """For .yaml: heights above the ground at which walls, furniture and edges make a cell occupied,
+    by default 0.2:1.0 [m]: the largest step and the height of the robot."""
 
     task: TaskFile | None = None
     """For a run: a Python file with a task of your own, which it was
@@ -95,9 +101,10 @@ class Export(PluginCommand):
             "full": self.full or None,
             "closed": self.closed or None,
             "y_up": self.y_up or None,
-            "max_step": self.max_step,
+            "height_band": self.height_band
+            and parse_range("--height-band", self.height_band, "0.1:1.0"),
         }
-        return {name: value for name, value in given.items() if value is not None}
+        return {name: value for name, value in given.items() if value not in (None, "")}
 
     def _export_map(self) -> None:
         for name in ("checkpoint", "example", "deploy-yaml"):

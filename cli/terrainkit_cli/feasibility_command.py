@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
 from terrainkit.map.layout import column_types
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain.worker_pool import worker_pool
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
     Jobs,
@@ -19,10 +20,10 @@ from terrainkit_cli.argument_types import (
     OutputPath,
     RobotName,
     parse_pairs,
+    parse_range,
 )
 from terrainkit_cli.parse import value_of
 from terrainkit_cli.plugin_command import PluginCommand
-from terrainkit_cli.worker_pool import worker_pool
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -44,7 +45,7 @@ class Feasibility(PluginCommand):
     The demand of a patch is 0 on level ground and 1 at the limit of the robot. It is the largest
     ratio of a quantity, such as the height of a step, to its limit for the robot. It is computed on
     the least demanding path from the spawn origin through the goals or, without goals, to the far
-    edge.
+    edge. The walking demand has the margins that walking policies need.
 
     Exit code 0: the robot can cross every patch. 1: a patch demands more than 1. 2: the input is
     invalid.
@@ -82,18 +83,20 @@ class Feasibility(PluginCommand):
             for suffix in (".json", ".png"):
                 check_target(target.with_suffix(suffix), overwrite=self.overwrite)
         with worker_pool(self.jobs) as executor:
-            results = assess_map(
-                terrain_map, derived.limits, progress=render.progress, executor=executor
-            )
+            assess = partial(assess_map, terrain_map, progress=render.progress, executor=executor)
+            results = assess(derived.limits)
+            walking = assess(derived.limits.walking())
         render.result(f"{derived.robot}:")
-        rows = [(f"  {name}", f"{value:.3g}") for name, value in vars(derived.limits).items()]
-        render.table([(*row, derived.reasons[row[0].strip()]) for row in rows])
+        values = vars(derived.limits)
+        render.table([(f"  {k}", f"{values[k]:.3g}", why) for k, why in derived.reasons.items()])
         render.result(
             "\nlargest demand of each terrain and level (1: limit; inf: over 2, no path):"
         )
         render.table(demand_table(results))
+        render.result("\nlargest walking demand, with the margins that walking policies need:")
+        render.table(demand_table(walking))
         if target:
-            self._write(target, terrain_map, results, derived)
+            self._write(target, terrain_map, results, walking, derived)
         return print_impassable(results, derived, self.map)
 
     def _write(
@@ -101,6 +104,7 @@ class Feasibility(PluginCommand):
         target: Path,
         terrain_map: TerrainMap,
         results: "Sequence[PatchFeasibility]",
+        walking: "Sequence[PatchFeasibility]",
         derived: "DerivedLimits",
     ) -> None:
         from terrainkit import __version__
@@ -116,7 +120,7 @@ class Feasibility(PluginCommand):
         }
         path = target.with_suffix(".json")
         with atomic_write(path, overwrite=self.overwrite) as temporary:
-            document = json.dumps(to_json(results, derived.limits, **about))
+            document = json.dumps(to_json(results, walking, derived.limits, **about))
             temporary.write_text(f"{document}\n", encoding="utf-8")
             write_preview(terrain_map, temporary.with_suffix(".png"), routes=routes(results))
         render.result(f"\nwrote {path} and {path.with_suffix('.png')}")
@@ -161,9 +165,7 @@ def solve_demand(
     from terrainkit.feasibility.report import demand_text
     from terrainkit.feasibility.solve import solve_ranges
 
-    ends: Any = tuple(value_of(text) for text in demand.split(":"))
-    if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
-        raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
+    ends = parse_range("--demand", demand, "0.2:0.9")
     derived = robot_limits(robot, limits)
     terrains, columns = config.sub_terrains, column_types(config)
     if config.mode != "randomized":  # sub-terrains of a preset without a column are not solved

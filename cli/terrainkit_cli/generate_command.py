@@ -13,13 +13,13 @@ from terrainkit.terrain import registry
 from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
+from terrainkit.terrain.worker_pool import worker_pool
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import Jobs, Limits, OutputPath, RobotName, is_map
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import option, value_of
 from terrainkit_cli.plugin_command import PluginCommand
-from terrainkit_cli.worker_pool import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)

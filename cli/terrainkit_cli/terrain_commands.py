@@ -321,6 +321,9 @@ class Preview(PluginCommand):
     width: int = 1600
     """Width of the map in the image [pixels]; a tall map is narrower, and a long one is divided."""
 
+    storey: int | None = None
+    """Draw only this storey of buildings: 0 is the ground floor. Walls are cut off above it."""
+
     overwrite: bool = False
     """Replace an existing file."""
 
@@ -330,7 +333,9 @@ class Preview(PluginCommand):
 
         terrain_map = TerrainMap.load(self.map)
         output = self.output or self.map.with_suffix(".png")
-        write_preview(terrain_map, output, width=self.width, overwrite=self.overwrite)
+        write_preview(
+            terrain_map, output, width=self.width, overwrite=self.overwrite, storey=self.storey
+        )
         render.result(written(terrain_map, output))
         return 0
 

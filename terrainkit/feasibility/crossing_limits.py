@@ -1,8 +1,9 @@
 """RobotLimits: what a robot can cross, one number per quantity."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, Self
 
 from msgspec import Meta
 
@@ -12,6 +13,22 @@ from terrainkit.settings.text import expected_names
 from terrainkit.settings.type_hint import MAX_VALUE, convert
 
 Limit = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
+
+# Of the values on one half of a grid over each dimension, those that agree most often with whether
+# `quadruped_map` and `quadruped_hard` cross; the easiest of several. Steps up and gaps stay as they
+# are, since no other value agrees more often. benchmarks/results/feasibility.md has the grid.
+_WALKING = {"step_down": 1.25, "slope": 0.64, "foothold": 3.2}
+"""Walking limits, in limits of the robot."""
+
+_MAX_WALKING_FOOTHOLD = 0.28
+"""Foothold to which the margin extends, at most [m]: treads of stairs are footholds."""
+
+_WALKING_CLEARANCES = (1.3, 1.05)
+"""Clearances below which walking demands something, and above which robots walk upright, in
+standing heights. The policies do not crouch, and the body moves up and down."""
+
+_WALKING_YAW = 0.45
+"""Angle between a walking body and the passage [rad], so that the length of the body counts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +68,12 @@ class RobotLimits(Config):
     """Largest share of the friction coefficient that a slope takes, as rise over run divided by the
     coefficient. A foot slides above 1; the rest is for the horizontal forces of walking."""
 
+    body_length: Limit | None = None
+    """Length of the body [m]; None if it is as long as it is wide. Only walking limits need it."""
+
+    turning_width: Limit | None = None
+    """Width of the narrowest passage that is longer than the body [m]; None for `body_width`."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.crouched_height >= self.standing_height:
@@ -58,6 +81,26 @@ class RobotLimits(Config):
                 f"crouched_height: got {self.crouched_height:g} m; expected less than the "
                 f"standing_height of {self.standing_height:g} m"
             )
+
+    def walking(self) -> Self:
+        """Return the limits of the walking demand, with the margins that walking robots need.
+
+        In a passage that is longer than the body, the robot needs room to turn: the diagonal of its
+        body.
+        """
+        length = self.body_length or self.body_width
+        upright, lowest = _WALKING_CLEARANCES
+        factors = {name: factor * getattr(self, name) for name, factor in _WALKING.items()}
+        foothold = max(self.foothold, min(factors.pop("foothold"), _MAX_WALKING_FOOTHOLD))
+        return replace(
+            self,
+            foothold=foothold,
+            body_width=self.body_width * math.cos(_WALKING_YAW) + length * math.sin(_WALKING_YAW),
+            turning_width=math.hypot(length, self.body_width),
+            standing_height=upright * self.standing_height,
+            crouched_height=lowest * self.standing_height,
+            **factors,
+        )
 
 
 def limit_overrides(values: Mapping[str, object]) -> dict[str, float]:

@@ -71,6 +71,9 @@ class FootholdGraph:
             "body_width": free_width.at_nodes(),
             "crouched_height": columns.ceiling - columns.floor,
         }
+        if limits.turning_width:
+            widths = quantities["body_width"]
+            quantities["turning_width"] = free_width.in_long_passages(widths)
         flat = {name: values.reshape(-1) for name, values in quantities.items()}
         demands = [ratio(name, values, limits) for name, values in flat.items()]
         demand = max_ratio(demands)
@@ -134,7 +137,7 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
     """
     limit = getattr(limits, name)
     result: FloatArray
-    if name in ("foothold", "body_width"):
+    if name in ("foothold", "body_width", "turning_width"):
         # 1 at the limit, and 0 from twice the limit on.
         result = np.maximum(2.0 - value / limit, 0.0)
     elif name == "crouched_height":

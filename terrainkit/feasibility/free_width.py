@@ -87,6 +87,31 @@ class FreeWidth:
         widths.reshape(-1)[node] = self.at(*self.columns.column(node), z, clearance)
         return widths
 
+    def in_long_passages(self, widths: FloatArray) -> FloatArray:
+        """Return the free width in passages narrower than the turning width, longer than the body.
+
+        Args:
+            widths: Free width at each node [m], shape (nx, ny, m).
+
+        Returns:
+            Free width [m], shape (nx, ny, m); inf outside of such passages.
+        """
+        import cv2
+
+        max_width = self.limits.turning_width or self.limits.body_width
+        max_length = self.limits.body_length or self.limits.body_width
+        result = np.full(widths.shape, np.inf)
+        for k in range(widths.shape[2]):
+            width = widths[..., k]
+            is_narrow = (width < max_width) & ~np.isnan(self.columns.floor[..., k])
+            labels = cv2.connectedComponents(is_narrow.astype(np.uint8), connectivity=4)[1]
+            # The area of a passage over its width is its length.
+            lengths = self.columns.spacing**2 / width
+            length = np.bincount(labels.reshape(-1), weights=lengths.reshape(-1))[labels]
+            is_long = is_narrow & (length > max_length)
+            result[is_long, k] = width[is_long]
+        return result
+
     def at(self, i: IntArray, j: IntArray, z: FloatArray, clearance: FloatArray) -> FloatArray:
         """Return the free width for robots at columns (i, j), shape (n,).
 

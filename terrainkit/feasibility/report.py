@@ -77,12 +77,16 @@ def blocking_text(result: PatchFeasibility, limits: RobotLimits) -> str:
 
 
 def to_json(
-    results: Sequence[PatchFeasibility], limits: RobotLimits, **about: Any
+    results: Sequence[PatchFeasibility],
+    walking: Sequence[PatchFeasibility],
+    limits: RobotLimits,
+    **about: Any,
 ) -> dict[str, Any]:
     """Return the report as values of JSON; a demand of inf is null.
 
     Args:
         results: The patches.
+        walking: The same patches for `limits.walking()`.
         limits: The limits of the robot.
         **about: Further values, such as the name of the robot.
     """
@@ -100,24 +104,28 @@ def to_json(
                 "terrain": patch.terrain,
                 "difficulty": round(patch.difficulty, 6),
                 "demand": patch.demand if math.isfinite(patch.demand) else None,
+                "walking_demand": walk.demand if math.isfinite(walk.demand) else None,
+                "walking_limit": walk.limit or None,
                 "passable": patch.is_passable,
                 "limit": patch.limit or None,
                 "value": round(patch.value, 6) if math.isfinite(patch.value) else None,
                 "place": patch.place.round(4).tolist() if patch.limit else None,
                 "path": patch.path.round(4).tolist(),
             }
-            for patch in results
+            for patch, walk in zip(results, walking, strict=True)
         ],
     }
 
 
 def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
     """Return the paths and blocking places for `terrainkit.views.preview.write_preview`."""
+    over = f"> {MAX_DEMAND:g}"
     return [
         Route(
             points=patch.path[:, :2],
-            place=tuple(patch.place[:2].tolist()) if patch.limit else None,
-            label=demand_text(patch.demand),
+            # Without a limit, there is no demand or no path: the mark is at the start.
+            place=tuple((patch.place if patch.limit else patch.path[0])[:2].tolist()),
+            label=demand_text(patch.demand).replace("inf", over if patch.limit else "no path"),
             is_passable=patch.is_passable,
         )
         for patch in results

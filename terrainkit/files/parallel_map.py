@@ -30,12 +30,21 @@ def parallel_map(
         return
     try:
         yield from executor.map(function, items)
-    except TerrainkitError:
-        raise
-    except Exception as error:  # each kind of executor has its own errors
-        if type(error).__module__ == "builtins" and not isinstance(error, OSError):
-            raise  # an error of the function
-        reason = " ".join(f"{type(error).__name__}: {error}".split()).strip(":.")
-        raise TerrainkitError(
-            f"an executor failed: {reason}; use fewer processes if memory is short"
-        ) from error
+    except Exception as error:
+        failure = executor_failure(error)
+        raise TerrainkitError(f"{failure}; use fewer processes if memory is short") from error
+
+
+def executor_failure(error: Exception) -> str:
+    """Return in one line why an executor failed.
+
+    Args:
+        error: What the executor raised. It is raised again if it is an error of the function that
+            the executor called.
+    """
+    # Each kind of executor has its own errors.
+    is_built_in = type(error).__module__ == "builtins" and not isinstance(error, OSError)
+    if is_built_in or isinstance(error, TerrainkitError):
+        raise error
+    reason = " ".join(f"{type(error).__name__}: {error}".split()).strip(":.")
+    return f"an executor failed: {reason}"

@@ -64,17 +64,22 @@ def free_intervals(
     return np.where(np.take_along_axis(free, order, axis=1)[..., None], chosen, np.nan)
 
 
-def clearance(heights: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+def clearance(
+    heights: NDArray[np.float64], bounds: NDArray[np.float64], step_height: float
+) -> NDArray[np.float64]:
     """Return the free height above the ground on vertical lines.
 
     Args:
         heights: Height of the ground on each line [m], shape (n,).
         bounds: Bottom and top of the solids on each line [m], shape (n, k, 2), padded with NaN.
+        step_height: Height above the ground up to which the top of a solid is a floor, too [m].
 
     Returns:
-        Free height [m], shape (n,): inf under the open sky, 0 where a solid covers the ground.
+        Free height above the highest of these floors [m], shape (n,): inf under the open sky, 0
+        where a higher solid covers the ground.
     """
-    bottom, top = bounds[..., 0], bounds[..., 1]
-    above = top > heights[:, None] + CONTACT  # solids within the ground do not count; NaN is False
-    gap = np.where(above, bottom - heights[:, None], np.inf).min(axis=1, initial=np.inf)
-    return np.where(gap < CONTACT, 0.0, gap)
+    intervals = free_intervals(heights, bounds)
+    is_low = intervals[..., 0] <= heights[:, None] + (step_height + CONTACT)  # NaN is False
+    highest = np.maximum(is_low.sum(axis=1) - 1, 0)
+    floor, ceiling = np.take_along_axis(intervals, highest[:, None, None], axis=1)[:, 0].T
+    return np.where(is_low.any(axis=1), ceiling - floor, 0.0)

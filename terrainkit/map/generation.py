@@ -35,7 +35,7 @@ Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
 _BYTES_PER_SAMPLE = 5
 """Peak memory of a sample, whose height takes 4 [bytes]."""
 
-_BYTES_PER_PATCH = 2000
+BYTES_PER_PATCH = 2000
 """Memory of the parameters, origin and difficulty of a patch [bytes]."""
 
 
@@ -78,7 +78,7 @@ def generate(
     grid = config.grid
     samples = grid.shape[0] * grid.shape[1]
     check_memory(
-        samples * _BYTES_PER_SAMPLE + config.rows * config.cols * _BYTES_PER_PATCH,
+        samples * _BYTES_PER_SAMPLE + config.rows * config.cols * BYTES_PER_PATCH,
         f"a map of {grid.shape[0]} x {grid.shape[1]} samples",
         ("rows", config.rows),
     )
@@ -87,7 +87,7 @@ def generate(
     with closing(_build_patches(config, column_types(config), executor)) as patches:
         # An executor forks now, before the map takes memory that each process would have.
         first = next(patches)
-        builder = _MapBuilder(config)
+        builder = MapBuilder(config)
         built = itertools.chain([first], patches)
         for (row, col), (terrain_type, patch) in zip(places, built, strict=True):
             builder.add(row, col, terrain_type, patch)
@@ -97,7 +97,7 @@ def generate(
     return terrain_map
 
 
-class _MapBuilder:
+class MapBuilder:
     """A map whose patches are added one by one, so that they are in memory once."""
 
     def __init__(self, config: MapConfig) -> None:
@@ -216,7 +216,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     return padded
 
 
-def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
+def _warnings(builder: MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
     """Yield the warnings about a generated map."""
     config = terrain_map.config
     if builder.deviations:

@@ -50,6 +50,21 @@ def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
     return [int(n) for n in counts]
 
 
+def check_can_generate(config: MapConfig) -> None:
+    """Check that patches can be generated from a config.
+
+    Raises:
+        ConfigError: if a class of the user is missing, or the map was imported or edited.
+    """
+    if config.problems:
+        raise ConfigError("; ".join(config.problems))
+    if config.mode == "custom":
+        raise ConfigError(
+            "mode custom: the map was imported or edited, and cannot be generated from its config; "
+            "expected mode curriculum, selected or randomized"
+        )
+
+
 def column_types(config: MapConfig) -> list[int]:
     """Return the terrain type of each column as an index into `config.sub_terrains`.
 
@@ -59,13 +74,7 @@ def column_types(config: MapConfig) -> list[int]:
     Raises:
         ConfigError: if a custom sub-terrain gets no column, or the map is not generated.
     """
-    if config.problems:
-        raise ConfigError("; ".join(config.problems))
-    if config.mode == "custom":
-        raise ConfigError(
-            "mode custom: the map was imported or edited, and cannot be generated from its config; "
-            "expected mode curriculum, selected or randomized"
-        )
+    check_can_generate(config)
     sub_terrains = config.sub_terrains
     counts = allocate_columns([terrain.proportion for terrain in sub_terrains], config.cols)
     pairs = zip(sub_terrains, counts, strict=True)

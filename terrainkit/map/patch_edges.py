@@ -100,7 +100,7 @@ class PatchEdges:
         y = config.grid.axis(1)[slice(j, j + ny) if across_x else slice(j - 1, j + 1)]
         xy = np.stack(np.meshgrid(x, y), axis=-1)
         # The clearance is 0 where a solid covers the ground.
-        return not self.terrain_map.clearance(xy).any()
+        return not self.terrain_map.clearance(xy, step_height=0.0).any()
 
 
 def _line_heights(heights: NDArray[np.float32], lines: NDArray[np.int64]) -> NDArray[np.float32]:

@@ -143,18 +143,47 @@ class TerrainMap:
         bounds = self._visible.intervals(starts[:, :2])
         return first_surface(ground, bounds, starts[:, 2], direction).reshape(shape)
 
-    def clearance(self, xy: ArrayLike) -> NDArray[np.float64]:
+    def clearance(self, xy: ArrayLike, step_height: float = 0.1) -> NDArray[np.float64]:
         """Return the free height above the ground at `xy` [m], below the solids that collide.
 
         Args:
             xy: Points [m], shape (..., 2).
+            step_height: Height above the ground up to which the top of a solid, such as the sill
+                of a door, is a floor on which a robot steps [m].
 
         Returns:
-            Clearance [m], shape (...): inf under the open sky, 0 where a solid covers the ground.
+            Clearance above the ground or this floor [m], shape (...): inf under the open sky, 0
+            where a higher solid covers the ground.
         """
         points, shape = _points("xy", xy, 2)
         ground = self._surface_at(points).height
-        return clearance(ground, self._collision_index.intervals(points)).reshape(shape)
+        bounds = self._collision_index.intervals(points)
+        return clearance(ground, bounds, step_height).reshape(shape)
+
+    def occupancy(self, low: float, high: float) -> NDArray[np.bool_]:
+        """Return the occupancy grid of the ground for a robot that walks on it.
+
+        A cell is occupied if a solid that collides overlaps it anywhere between `low` and `high`
+        above the ground, or if the ground of a neighbor, also a diagonal one, is lower by more than
+        `low`. The cells are those of `heights`.
+
+        Args:
+            low: Height of the largest step of the robot [m]; lower sills and curbs are free.
+            high: Height of the robot [m]; lintels and ceilings from there on are free.
+
+        Returns:
+            Whether each cell is occupied, shape `grid.shape`.
+
+        Raises:
+            ConfigError: if the band is empty or `low` is negative.
+        """
+        from terrainkit.geometry.occupancy_grid import occupied_cells
+
+        if not 0 <= low < high:
+            raise ConfigError(f"height band: got {low:g} m to {high:g} m; expected 0 <= low < high")
+        return occupied_cells(
+            self.grid, self.heights, self.solids.select(self.solids.collides), low, high
+        )
 
     def intervals(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the free intervals above the ground at `xy`, between the solids that collide.

@@ -253,7 +253,7 @@ def _floor_and_headroom(
         floor, ceiling = terrain_map.scan(near, "down"), terrain_map.scan(near, "up")
         if abs(floor[0] - z) <= TOLERANCE:
             return floor, float(np.nanmin(np.append(ceiling, np.inf))) - z
-    return ground, float(terrain_map.clearance(xy).min())
+    return ground, float(terrain_map.clearance(xy, step_height=0.0).min())
 
 
 def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:

@@ -12,9 +12,11 @@ from terrainkit.views.preview import (
     LEVELS,
     LIGHT,
     Levels,
+    hatch_friction,
     height_colors,
     map_levels,
     map_title,
+    own_frictions,
     shaded_colors,
     shaded_relief,
 )
@@ -37,6 +39,10 @@ _ELEVATION = np.radians(50.0)
 _FILL = 0.85
 """Side of the square that the patches fill, relative to the height of the picture."""
 
+_CONTRAST = 0.15
+"""Contrast of the shading of solids, relative to the ground's: walls that face away from the light
+are not dark, so that rooms can be seen."""
+
 _SHADOW = 0.4
 """Opacity of shadows on the ground."""
 
@@ -53,9 +59,10 @@ _ABOVE_GROUND = 0.1
 def show_map(server: "viser.ViserServer", terrain_map: "TerrainMap") -> "viser.FrameHandle":
     """Add a map to the scene of a viser server, and a checkbox for each of its parts.
 
-    The parts are the ground and the solids, colored and shaded as in the preview, and in another
-    color the solids that are not visible to sensors or do not collide; spawn positions and goals
-    with their headings; the order of the goals; and the names of the terrains with the levels.
+    The parts are the ground and the solids, colored, shaded and hatched for friction as in the
+    preview, and in another color the solids that are not visible to sensors or do not collide;
+    spawn positions and goals with their headings; the order of the goals; and the names of the
+    terrains with the levels. A slider cuts the solids off at a height, such as floors and roofs.
     New pages show all patches, with x to the right and y away, as in the preview.
 
     Returns:
@@ -75,10 +82,15 @@ def show_map(server: "viser.ViserServer", terrain_map: "TerrainMap") -> "viser.F
     }
     names = html.escape(", ".join(terrain_map.terrain_names))
     title = f"<b>{map_title(terrain_map.config)}</b><br>{names}"
+    if len(frictions := own_frictions(terrain_map)):
+        low, high = frictions[[0, -1]].tolist()
+        title += f"<br>hatched: friction {low:.2f} (dense) to {high:.2f}"
     server.gui.add_html(f'<div style="margin: 0.5em">{title}</div>')
     for name, handles in parts.items():
         if handles:
             add_checkbox(server, name, handles)
+    if solids := parts["solids"]:
+        _add_cut(server, terrain_map, solids)
     lower, upper = _patch_bounds(terrain_map)
     server.initial_camera.fov = FIELD_OF_VIEW
     server.initial_camera.look_at = (lower + upper) / 2
@@ -142,7 +154,9 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
     mesh = terrain_map.ground_mesh()
     grid = terrain_map.grid
     levels = map_levels(terrain_map.heights)
-    relief = Image.fromarray(shaded_relief(terrain_map.heights, grid.cell, levels))
+    picture = shaded_relief(terrain_map.heights, grid.cell, levels)
+    hatch_friction(picture, terrain_map.friction, terrain_map.config.static_friction)
+    relief = Image.fromarray(picture)
     relief.thumbnail((_MAX_TEXTURE, _MAX_TEXTURE))
     x, y = ((mesh.vertices[:, :2] - grid.lower) / grid.size).T
     uv = np.stack([y, 1 - x], axis=1)  # image rows are along x
@@ -151,14 +165,32 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
     server.scene.add_glb("/map/ground", data, cast_shadow=False, receive_shadow=_SHADOW)
 
 
-def _add_solids(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[Any]:
-    solids = terrain_map.solids
+def _add_cut(server: "viser.ViserServer", terrain_map: "TerrainMap", handles: list[Any]) -> None:
+    """Add a slider for the height at which the solids, whose handles it renews, are cut off."""
+    low, high = (bound[:, 2] for bound in terrain_map.solids.bounds())
+    top = float(high.max()) + 0.1
+    slider = server.gui.add_slider("height cut [m]", float(low.min()), top, 0.1, top)
+
+    def update(_: object) -> None:
+        for handle in handles:
+            handle.remove()
+        handles[:] = _add_solids(server, terrain_map, slider.value)
+
+    slider.on_update(update)
+
+
+def _add_solids(
+    server: "viser.ViserServer", terrain_map: "TerrainMap", cut: float = np.inf
+) -> list[Any]:
+    """Add the solids, cut off at a height [m]."""
+    solids = terrain_map.solids.select(terrain_map.solids.bounds()[0][:, 2] < cut)
     is_usual = solids.visible & solids.collides
     handles = []
     levels = map_levels(terrain_map.heights)
     for name, chosen in (("solids", is_usual), ("special_solids", ~is_usual)):
         if chosen.any():
             mesh = concatenate_meshes(solid_meshes(solids.select(chosen)))
+            mesh.vertices[:, 2] = np.minimum(mesh.vertices[:, 2], cut)
             corners = mesh.vertices[mesh.triangles].astype(np.float64)
             colors = triangle_colors(corners, None if name == "solids" else _HIDDEN_COLOR, levels)
             linear = 255 * (colors / 255) ** 2.2  # as glTF defines the colors of vertices
@@ -176,7 +208,9 @@ def triangle_colors(
     color: tuple[int, int, int] | None = None,
     levels: Levels = LEVELS,
 ) -> NDArray[np.float64]:
-    """Return the colors of triangles, shaded by slope as in the preview.
+    """Return the colors of triangles, shaded by slope as in the preview, with less contrast.
+
+    The color of a wall is that of its lower end, which is lighter than that of its top.
 
     Args:
         corners: Corners [m], counter-clockwise, shape (n, 3, 3).
@@ -188,8 +222,8 @@ def triangle_colors(
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    level = np.array(color or height_colors(corners[:, :, 2].max(axis=1), levels))
-    return shaded_colors(level, normals @ LIGHT / LIGHT[2])
+    level = np.array(color or height_colors(corners[:, :, 2].min(axis=1), levels))
+    return shaded_colors(level, 1 + _CONTRAST * (normals @ LIGHT / LIGHT[2] - 1))
 
 
 def _shaded_glb(
@@ -244,8 +278,9 @@ def _add_labels(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[
     config, ((x, y, low), (_, _, high)) = terrain_map.config, _patch_bounds(terrain_map)
     (length, width), z = config.patch_size, min(max(0.0, low), high)
     first_row = terrain_map.patch_names[0].tolist() if config.mode != "randomized" else []
+    row = "row" if config.mode == "custom" else "level"
     labels = [
-        (f"level_{i}", f"level {i}", x + (i + 0.5) * length, y - 0.5, "top-center")
+        (f"level_{i}", f"{row} {i}", x + (i + 0.5) * length, y - 0.5, "top-center")
         for i in range(config.rows)
     ]
     for name, group in groupby(range(len(first_row)), first_row.__getitem__):

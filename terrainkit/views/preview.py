@@ -14,6 +14,7 @@ from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit.geometry.solids import Solids
 from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, Block, make_blocks
+from terrainkit.views.storey import storey_map
 
 if TYPE_CHECKING:
     from terrainkit.geometry.mesh.tri_mesh import TriMesh
@@ -24,15 +25,16 @@ Picture = NDArray[np.uint8]
 Levels = NDArray[np.float64]
 
 _COLORS = (
-    (-10.0, (38, 32, 44)),
-    (-1.5, (70, 62, 92)),
-    (-0.4, (112, 138, 168)),
+    (-10.0, (24, 22, 20)),
+    (-1.5, (83, 80, 74)),
+    (-0.4, (150, 146, 137)),
     (0.0, (224, 221, 208)),
     (0.4, (214, 178, 128)),
     (1.5, (164, 104, 62)),
-    (4.0, (116, 66, 46)),
+    (4.0, (98, 48, 36)),
 )
-"""Color (red, green, blue) by height [m]: blue below 0, brown above."""
+"""Color (red, green, blue) by height [m]: gray below 0, which does not look like water, and brown
+above. The differences between neighbors are 27 to 29 in CIELAB, the same for the eye."""
 
 LEVELS = np.array([level for level, _ in _COLORS])
 """Heights of the colors of generated maps [m]."""
@@ -48,6 +50,9 @@ _SOLID_OPACITY = 0.75
 _BACKGROUND = (250, 249, 246)
 _HATCH = 12
 """Distance between the hatching lines of hanging solids along an axis [px]."""
+
+_FRICTION_HATCH = np.array([6.0, 20.0])
+"""Distance between the hatching lines of a friction of 0, and what a friction of 1 adds [px]."""
 
 _HANGING = 0.02
 """Height above the ground below its center from which a solid hangs [m]."""
@@ -81,8 +86,8 @@ class Route:
     points: NDArray[np.float64]
     """Points of the path, x and y [m], shape (n, 2)."""
 
-    place: tuple[float, float] | None
-    """Position of the mark, x and y [m]; None for no mark."""
+    place: tuple[float, float]
+    """Position of the mark, x and y [m]."""
 
     label: str
     """Text beside the mark."""
@@ -98,6 +103,7 @@ def write_preview(
     width: int = 1600,
     overwrite: bool = False,
     routes: Sequence[Route] = (),
+    storey: int | None = None,
 ) -> Path:
     """Write the preview of `terrain_map` to the .png file `path`, and return `path`.
 
@@ -107,8 +113,10 @@ def write_preview(
         width: Width of the relief [px]. A tall map is narrower, and a long map is divided.
         overwrite: Replace an existing file.
         routes: Paths to draw.
+        storey: Draw only this storey of buildings, 0 for the ground floor; None for all.
 
     Raises:
+        ConfigError: if no building has this storey.
         ExportError: if the suffix is not .png, or the target cannot be written.
     """
     path = Path(path)
@@ -117,6 +125,7 @@ def write_preview(
     if not 100 <= width <= MAX_PIXELS:
         raise ExportError(f"width: got {width}; expected 100 to {MAX_PIXELS}")
     require_finite(terrain_map)
+    terrain_map = terrain_map if storey is None else storey_map(terrain_map, storey)
     with atomic_write(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(_encode(render_preview(terrain_map, width, routes), ".png"))
     return path
@@ -157,10 +166,7 @@ def render_preview(
     low = min([*(float(heights.min()) for heights in shown), tops.min(initial=np.inf)])
     high = max([*(float(heights.max()) for heights in shown), tops.max(initial=-np.inf)])
     _draw_color_bar(image[:, span:], low, high, blocks[0].size[1], levels)
-    if _is_hanging(terrain_map, terrain_map.solids).any():
-        y = ABOVE + min(blocks[0].size[1], _MAX_BAR_HEIGHT)
-        _write(image, "hatched:", (span + 20, y + 26))
-        _write(image, "hangs", (span + 20, y + 42))
+    _draw_legend(image[-26:-6, LEFT:], terrain_map, has_routes=bool(routes))
     return image
 
 
@@ -170,7 +176,11 @@ def _draw_block(
     """Return the picture of a block with its labels to the left and below."""
     width, height = block.size
     relief = _relief(terrain_map.heights[block.cells], block, levels)
-    _draw_solids(relief, terrain_map, block, levels)
+    friction = terrain_map.friction[block.cells].T[::-1]
+    nearest = (np.arange(n) * m // n for n, m in zip(block.size[::-1], friction.shape, strict=True))
+    friction = friction[np.ix_(*nearest)]
+    _draw_solids(relief, friction, terrain_map, block, levels)
+    hatch_friction(relief, friction, terrain_map.config.static_friction)
     _draw_poses(relief, terrain_map, block)
     for route in routes:
         _draw_route(relief, route, block)
@@ -255,10 +265,52 @@ def height_colors(heights: NDArray[np.floating], levels: Levels = LEVELS) -> NDA
 
 
 def map_title(config: "MapConfig") -> str:
-    """Return the title of the pictures of a map."""
+    """Return the title of the pictures of a map: its size, its friction if not 1, and its seed."""
     size_x, size_y = config.patch_size
     patches = f"{config.rows} x {config.cols} patches of {size_x:g} m x {size_y:g} m"
-    return f"{patches}, seed {config.seed}"
+    friction = "" if config.static_friction == 1 else f", friction {config.static_friction:g}"
+    seed = "" if config.mode == "custom" else f", seed {config.seed}"
+    return patches + friction + seed
+
+
+def hatch_friction(picture: Picture, friction: NDArray[np.float32], usual: float) -> None:
+    """Hatch a picture where the friction is not the usual one: the lower it is, the denser.
+
+    The lines have the other direction than those of hanging solids.
+
+    Args:
+        picture: The picture, which is changed, shape (height, width, 3).
+        friction: Friction of each pixel, shape (height, width).
+        usual: Friction of the map.
+    """
+    spacing = np.rint(np.minimum(friction, 10.0) * _FRICTION_HATCH[1] + _FRICTION_HATCH[0])
+    row, col = np.ogrid[: friction.shape[0], : friction.shape[1]]
+    line = np.where(friction == np.float32(usual), -1, (col - row) % spacing)
+    picture[line == 0] = _TEXT_COLOR  # dark beside light, to be visible on any ground
+    picture[line == 1] = _BACKGROUND
+
+
+def own_frictions(terrain_map: "TerrainMap") -> NDArray[np.float32]:
+    """Return the frictions of the ground and the solids that are not the map's, ascending."""
+    usual = np.float32(terrain_map.config.static_friction)
+    ground, solids = terrain_map.friction, terrain_map.solids.friction
+    own = ground[ground != usual], solids[(solids != usual) & ~np.isnan(solids)]
+    return np.unique(np.concatenate(own))
+
+
+def _draw_legend(image: Picture, terrain_map: "TerrainMap", *, has_routes: bool) -> None:
+    """Explain the hatching and the routes in a line; of many frictions, three."""
+    frictions, x = own_frictions(terrain_map), 0
+    for friction in np.unique(np.percentile(frictions, (0, 50, 100)) if len(frictions) else []):
+        swatch = image[:, x : x + 50]
+        hatch_friction(swatch, np.full(swatch.shape[:2], friction, np.float32), np.nan)
+        _write(image, f"friction {friction:.2f}", (x + 56, 16))
+        x += 170
+    if _is_hanging(terrain_map, terrain_map.solids).any():
+        _write(image, "/// hangs", (x, 16))
+        x += 100
+    if has_routes:
+        _write(image, "green: can be crossed; red cross: cannot be crossed", (x, 16))
 
 
 def color_levels(low: float, high: float, levels: Levels = LEVELS) -> NDArray[np.float64]:
@@ -310,10 +362,17 @@ def _write(
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, color, 1, cv2.LINE_AA)
 
 
-def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block, levels: Levels) -> None:
+def _draw_solids(
+    image: Picture,
+    frictions: NDArray[np.float32],
+    terrain_map: "TerrainMap",
+    block: Block,
+    levels: Levels,
+) -> None:
     """Draw each solid: its upper facets, shaded, in the color of their height; the highest last.
 
-    The ground shows through. Solids that hang above the ground are hatched.
+    The ground shows through. Solids that hang above the ground are hatched. `frictions`, the
+    friction of the ground in each pixel, becomes that of the solids that have their own.
     """
     import cv2
 
@@ -322,8 +381,9 @@ def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block, levels
     lower, upper = (corner[:, :2] for corner in terrain_map.solids.bounds())
     is_near = np.all((lower < block.grid.upper) & (upper > block.grid.lower), axis=1)
     solids = terrain_map.solids.select(np.asarray(is_near))
-    meshes = zip(solid_meshes(solids), _is_hanging(terrain_map, solids), strict=True)
-    for mesh, hangs in sorted(meshes, key=lambda item: item[0].vertices[:, 2].max()):
+    hanging = _is_hanging(terrain_map, solids)
+    meshes = zip(solid_meshes(solids), hanging, solids.friction.tolist(), strict=True)
+    for mesh, hangs, friction in sorted(meshes, key=lambda item: item[0].vertices[:, 2].max()):
         outline = cv2.convexHull(block.pixels(mesh.vertices[:, :2]))
         first = np.maximum(outline.min(axis=(0, 1)), 0)
         x, y = first.tolist()
@@ -342,6 +402,8 @@ def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block, levels
             layer[(inside > 0) & ((x + j + y + i) % _HATCH < 2)] = edge
         window[:] = cv2.addWeighted(layer, _SOLID_OPACITY, window, 1 - _SOLID_OPACITY, 0)
         cv2.polylines(image, [outline], True, edge.tolist(), 1, cv2.LINE_AA)
+        if not math.isnan(friction):
+            cv2.fillConvexPoly(frictions, outline, friction)
 
 
 def _is_hanging(terrain_map: "TerrainMap", solids: Solids) -> NDArray[np.bool_]:
@@ -373,6 +435,7 @@ def _facets(
 def _draw_labels(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
     """Write the names of the columns to the left, and the difficulties of the rows below."""
     config, (_, height) = terrain_map.config, block.size
+    is_custom = config.mode == "custom"  # an imported map, which has no difficulty
     size_x, size_y = config.patch_size
     for col in block.cols[:: max(1, math.ceil(_LABEL_HEIGHT / (size_y * block.scale)))]:
         _, y = block.pixels(config.patch_grid(block.rows[0], col).center).tolist()
@@ -382,10 +445,10 @@ def _draw_labels(image: Picture, terrain_map: "TerrainMap", block: Block) -> Non
     for row in block.rows[:: max(1, math.ceil(_LABEL_WIDTH / (size_x * block.scale)))]:
         x, _ = block.pixels(config.patch_grid(row, block.cols[0]).center).tolist()
         low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
-        level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"
+        level = f": d {low:.2f}" if low == high else f": d {low:.2f}-{high:.2f}"
         x = min(LEFT + x - 36, image.shape[1] - _LABEL_WIDTH)
-        _write(image, f"{row}: d {level}", (x, height + 24))
-    _write(image, "rows (x): difficulty", (10, height + 24))
+        _write(image, f"{row}{'' if is_custom else level}", (x, height + 24))
+    _write(image, "rows (x)" if is_custom else "rows (x): difficulty", (10, height + 24))
 
 
 def _draw_poses(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
@@ -411,15 +474,17 @@ def _draw_poses(image: Picture, terrain_map: "TerrainMap", block: Block) -> None
 
 
 def _draw_route(image: Picture, route: Route, block: Block) -> None:
-    """Draw a path, and its mark with the label to the right."""
+    """Draw a path, and its mark with the label in a box to the right, within the picture."""
     import cv2
 
     color = _PASSABLE_COLOR if route.is_passable else _IMPASSABLE_COLOR
     cv2.polylines(image, [block.pixels(route.points)], False, color, 2, cv2.LINE_AA)
-    if route.place is not None:
-        x, y = block.pixels(route.place).tolist()
+    x, y = block.pixels(route.place).tolist()
+    if route.is_passable:
+        cv2.circle(image, (x, y), 5, color, -1, cv2.LINE_AA)
+    else:
         cv2.drawMarker(image, (x, y), color, cv2.MARKER_TILTED_CROSS, 14, 3, cv2.LINE_AA)
-        at = (min(x + 10, image.shape[1] - 36), y - 6)
-        font = cv2.FONT_HERSHEY_SIMPLEX
-        cv2.putText(image, route.label, at, font, 0.5, _BACKGROUND, 4, cv2.LINE_AA)
-        _write(image, route.label, at)
+    width = cv2.getTextSize(route.label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0][0]
+    x, y = min(x + 10, image.shape[1] - width - 4), max(y - 6, 16)
+    cv2.rectangle(image, (x - 3, y - 13), (x + width + 3, y + 4), _BACKGROUND, -1)
+    _write(image, route.label, (x, y))

@@ -118,7 +118,7 @@ def test_export_map(terrainkit, tmp_path):
     assert (tmp_path / "map.stl").stat().st_size > 1000
     assert terrainkit("export", "map.npz", "-o", "e/f/map.xml").returncode == 0
     assert (tmp_path / "e" / "f" / "map.xml").is_file()
-    run = terrainkit("export", "map.npz", "-o", "ros.yaml", "--max-step", 0.1)
+    run = terrainkit("export", "map.npz", "-o", "ros.yaml", "--height-band", "0.1:1.0")
     assert run.stdout.startswith("wrote ros.yaml, with ros.json, ros.pgm, ros.png beside it: 1 x 1")
     run = terrainkit("export", "map.npz", "-o", "model.sdf")
     assert run.stdout.startswith("wrote model.sdf, with model.stl beside it: 1 x 1")

@@ -96,6 +96,8 @@ def test_preview_has_the_given_width(terrainkit, tmp_path, small_map):
     picture = cv2.imread(str(tmp_path / "a.png"))
     assert picture.shape[1] >= 400
     assert picture.std() > 10
+    run = terrainkit("preview", small_map, "-o", "b.png", "--storey", 0)
+    assert (run.returncode, "expected a map with buildings" in run.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(

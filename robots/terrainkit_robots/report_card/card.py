@@ -202,9 +202,18 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
 
 
 def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
-    """Return the realized parameters of a column that differ between levels, for each level."""
+    """Return the realized parameters of a column that differ between levels, for each level.
+
+    The lowest friction of the ground is one of them, also where it only differs from the map's.
+    """
     realized = [dict(parameters.realized) for parameters in terrain_map.parameters[:, col].tolist()]
     names = [name for name in realized[0] if len({str(level[name]) for level in realized}) > 1]
+    patches = (terrain_map.config.patch_cells(row, col) for row in range(len(realized)))
+    frictions = [round(float(terrain_map.friction[cells].min()), 3) for cells in patches]
+    if {*frictions} != {round(terrain_map.config.static_friction, 3)}:
+        names.append("friction")
+        for level, friction in zip(realized, frictions, strict=True):
+            level["friction"] = friction
     return [{name: level[name] for name in names} for level in realized]
 
 

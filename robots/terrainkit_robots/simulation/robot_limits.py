@@ -69,7 +69,7 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
     if not spec.feet:
         raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
     leg, foot = _length(spec, "leg_length"), _length(spec, "foot_radius")
-    width, height = _extents(spec, folder / spec.mjcf)
+    length, width, height, center = _extents(spec, folder / spec.mjcf)
     about_leg = f"leg_length ({leg:g} m)"
     values = {
         "step_up": (STEP_UP * leg, f"{STEP_UP:g} x {about_leg}"),
@@ -84,7 +84,11 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
             max(height - CROUCH * leg, height / 2),
             f"standing_height - {CROUCH:g} x {about_leg}, at least half of it",
         ),
+        "body_length": (length, "length of the collision shapes in the default pose"),
     }
+    is_wheel = (spec.joint_array("stiffness") == 0) & (spec.joint_array("damping") > 0)
+    if np.count_nonzero(is_wheel) >= len(spec.feet):
+        values |= _wheel_limits(foot, (spec.stance_width or width) / 2 / center)
     limits = RobotLimits(**{name: round(value, 6) for name, (value, _) in values.items()})
     reasons = {name: reason for name, (_, reason) in values.items()}
     given = dict(overrides or {})
@@ -95,6 +99,18 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
     )
 
 
+def _wheel_limits(radius: float, tipping: float) -> dict[str, tuple[float, str]]:
+    """Return the limits that differ on wheels, and their reasons.
+
+    A wheel does not climb an edge above its axle, and it drops by 13 % of its radius into a gap of
+    one radius, which it can climb. On a steeper slope than `tipping`, the robot tips over sideways.
+    """
+    names = ("step_up", "step_down", "gap", "foothold")
+    limits = dict.fromkeys(names, (radius, f"radius of the wheels ({radius:g} m)"))
+    slope = min(SLOPE, tipping), "30 degrees, or half of the track over the height of the mass"
+    return limits | {"slope": slope}
+
+
 def _length(spec: RobotSpec, name: str) -> float:
     value = getattr(spec, name)
     if not value:
@@ -102,8 +118,11 @@ def _length(spec: RobotSpec, name: str) -> float:
     return float(value)
 
 
-def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
-    """Return the width and the height of the collision shapes in the default pose [m]."""
+def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float, float]:
+    """Return length, width and height of the collision shapes in the default pose [m].
+
+    The last value is the height of the center of mass above their lowest point [m].
+    """
     import mujoco
 
     if not mjcf.is_file():
@@ -124,5 +143,7 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
     geoms = np.flatnonzero(collides(model) & (model.geom_bodyid > 0))
     if not len(geoms):
         raise ConfigError("mjcf: got a robot without collision geoms; expected at least one")
-    _, width, height = np.ptp(box_corners(model, data, geoms), axis=0).tolist()
-    return width, height
+    mujoco.mj_comPos(model, data)
+    corners = box_corners(model, data, geoms)
+    length, width, height = np.ptp(corners, axis=0).tolist()
+    return length, width, height, float(data.subtree_com[0, 2] - corners[:, 2].min())

@@ -243,7 +243,7 @@ def _overhangs(terrain_map: TerrainMap, columns: Columns | None) -> dict[str, An
     xy = np.column_stack([grid.axis(0)[i], grid.axis(1)[j]])
     top, ground, ceiling = columns.top[i, j], columns.floor[i, j], columns.ceiling[i, j]
     map_ground = terrain_map.height(xy)
-    map_ceiling = map_ground + terrain_map.clearance(xy)
+    map_ceiling = map_ground + terrain_map.clearance(xy, step_height=0.0)
     map_top = terrain_map.scan(np.column_stack([xy, top + 1.0]))
     is_kept = np.isfinite(map_ceiling)
     error = np.abs(map_ground - ground)

@@ -57,10 +57,9 @@ def test_png_larger_range_writes_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", [".png", ".yaml"])
-def test_images_reject_maps_with_solids(solid_map, tmp_path, suffix):
+def test_images_reject_maps_with_solids(solid_map, tmp_path):
     solids = solid_map.solids.select(np.arange(4) < 1)
     terrain_map = dataclasses.replace(solid_map, solids=solids)
     with pytest.raises(ExportError, match="1 solids, which an image of heights cannot represent"):
-        terrain_map.save(tmp_path / f"map{suffix}")
+        terrain_map.save(tmp_path / "map.png")
     assert not list(tmp_path.iterdir())

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit.errors import ExportError, TerrainkitWarning
-from terrainkit.export.ros import occupied_cells
+from terrainkit.errors import ConfigError, TerrainkitWarning
 from tests.tables import read_table
 from tests.terrainkit.maps import plot
 
@@ -24,22 +23,21 @@ def test_yaml_and_occupancy_by_hand(tmp_path):
     assert (grey[::-1].T / 2**18 == HEIGHTS).all()
 
 
-def test_cells_above_steps_of_more_than_max_step_are_occupied():
-    """Of the block of 2 x 2 cells, all but the corner of the map have a lower neighbor."""
-    heights = np.zeros((4, 4), np.float32)
-    heights[:2, :2] = 0.5
-    expected = np.zeros((4, 4), bool)
-    expected[:2, :2] = [[False, True], [True, True]]
-    np.testing.assert_array_equal(occupied_cells(heights, 0.49), expected)
-    assert not occupied_cells(heights, 0.5).any()
-
-
-def test_max_step_is_above_0(tmp_path):
+def test_height_band_is_not_empty(tmp_path):
     path = tmp_path / "map.yaml"
-    with pytest.raises(ExportError, match="max_step: got 0 m"):
-        plot(HEIGHTS).save(path, max_step=0.0)
-    plot(HEIGHTS).save(path, max_step=0.3)
+    for low, high in ((-0.1, 1.0), (0.5, 0.5), (0.1, np.nan)):
+        with pytest.raises(ConfigError, match=f"height band: got {low:g} m to {high:g} m"):
+            plot(HEIGHTS).save(path, height_band=(low, high))
+    plot(HEIGHTS).save(path, height_band=(0.3, 1.0))
     assert set(path.with_suffix(".pgm").read_bytes()[11:]) == {254}
+
+
+def test_map_server_reads_the_occupancy_of_solids(solid_map, tmp_path):
+    path = solid_map.save(tmp_path / "map.yaml", height_band=(0.1, 1.0))
+    grey = cv2.imread(str(path.with_suffix(".pgm")), cv2.IMREAD_UNCHANGED)
+    # As map_server does: the last row has the lowest y, and dark pixels are occupied.
+    is_occupied = 1 - grey[::-1].T / 255 > 0.65
+    np.testing.assert_array_equal(is_occupied, solid_map.occupancy(0.1, 1.0))
 
 
 def test_map_with_several_frictions_warns(tmp_path):

@@ -30,6 +30,19 @@ def test_width_of_an_opening_in_a_thin_wall():
     assert widths(heights)[15, 10:14] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize(("length", "width"), [(4, np.inf), (6, np.inf), (7, 0.4)])
+def test_passages_longer_than_the_body(length, width):
+    """A passage 0.4 m wide, for a body 0.65 m long that turns in 0.7 m."""
+    heights = np.zeros((30, 30))
+    heights[10 : 10 + length] = 1.0
+    heights[10 : 10 + length, 10:14] = 0.0
+    limits = replace(WIDE, body_length=0.65, turning_width=0.7)
+    free_width = FreeWidth.build(columns_of(heights), limits)
+    found = free_width.in_long_passages(free_width.at_nodes())[..., 0]
+    assert found[10 : 10 + length, 10:14] == pytest.approx(width)
+    assert np.isinf(found[:, 20]).all()
+
+
 def test_one_wall_low_walls_and_slopes_leave_room():
     most = 2 * WIDE.body_width
     wall, low = np.zeros((30, 30)), np.full((30, 30), 0.2)

@@ -62,7 +62,7 @@ def test_patches_are_counted_up_to_the_easiest_that_is_not_passable():
         "gap: 2 of 2 patches, up to difficulty 0.25",
         "pit: 1 of 2 patches",
     ]
-    assert to_json(results, LIMITS)["terrains"]["pit"] == {
+    assert to_json(results, results, LIMITS)["terrains"]["pit"] == {
         "patches": 2,
         "passable": 1,
         "max_difficulty": None,
@@ -80,7 +80,7 @@ def test_blocking_text_has_value_limit_and_place():
 
 
 def test_json_has_null_for_what_is_not_finite():
-    report = to_json([EASY, LOST], LIMITS, robot="a")
+    report = to_json([EASY, LOST], [EASY, LOST], LIMITS, robot="a")
     patches = report.pop("patches")
     limits = report.pop("limits")
     counts = {"patches": 2, "passable": 1, "max_difficulty": None}
@@ -89,12 +89,15 @@ def test_json_has_null_for_what_is_not_finite():
     assert limits == vars(LIMITS)
     assert patches[0] == read_table(__file__, "json_has_null_for_what_is_not_finite")
     none = {"demand": None, "passable": False, "limit": None, "value": None, "place": None}
+    none |= {"walking_demand": None, "walking_limit": None}
     assert patches[1] == patches[0] | none | {"row": 2, "path": [[0.0, 2.0, 0.0]]}
-    assert to_json([EASY], LIMITS)["passable"]
+    assert to_json([EASY], [LOST], LIMITS)["passable"]
 
 
 def test_routes_have_path_mark_and_label():
     easy, lost = routes([EASY, LOST])
     assert easy.points.tolist() == [[0.0, 2.0], [2.0, 2.0]]
     assert (easy.place, easy.label, easy.is_passable) == ((1.0, 2.00004), "0.75", True)
-    assert (lost.place, lost.label, lost.is_passable) == (None, "inf", False)
+    assert (lost.place, lost.label, lost.is_passable) == ((0.0, 2.0), "no path", False)
+    (far,) = routes([replace(EASY, demand=np.inf)])
+    assert (far.place, far.label) == ((1.0, 2.00004), "> 2")

@@ -26,12 +26,12 @@ def test_free_intervals_of_overlapping_solids(solids, expected):
     assert found[0].tolist() == expected
 
 
-@pytest.mark.parametrize(("solid", "expected"), read_table(__file__, "clearance"))
-def test_clearance_of_ground_roof_and_block(solid, expected):
+@pytest.mark.parametrize(("solid", "step", "expected"), read_table(__file__, "clearance"))
+def test_clearance_of_ground_roof_and_block(solid, step, expected):
     spans = np.array([[solid, (3.0, 4.0)], [(NAN, NAN), (2.7, 2.8)]])
-    found = clearance(np.array([0.0, 2.0]), spans)
-    assert found.tolist() == pytest.approx([min(expected, 3.0), 0.7], abs=1e-12)
+    found = clearance(np.array([0.0, 2.0]), spans, step)
+    assert found.tolist() == pytest.approx([expected, 0.7], abs=1e-12)
 
 
 def test_clearance_under_the_open_sky_is_infinite():
-    assert clearance(np.zeros(2), np.empty((2, 0, 2))).tolist() == [INF, INF]
+    assert clearance(np.zeros(2), np.empty((2, 0, 2)), 0.1).tolist() == [INF, INF]

@@ -41,6 +41,7 @@ def test_building_doors_have_lintels_and_sills():
     # The entrance is at x = 1.6 m, in a wall of 0.2 m.
     assert x == pytest.approx(1.8 + 0.35)
     assert surfaces(terrain_map, [1.7, y, 1.0]) == pytest.approx([0.04, 1.9], abs=1e-4)
+    assert terrain_map.clearance([1.7, y]) == pytest.approx(1.86, abs=1e-4)
     for side in (-1, 1):
         assert surfaces(terrain_map, [1.7, y + side * 0.449, 1.0])[0] == pytest.approx(0.04)
         assert surfaces(terrain_map, [1.7, y + side * 0.451, 9.0])[0] > 4.0

@@ -9,7 +9,7 @@ import trimesh
 
 import terrainkit as tk
 from terrainkit.viewer.map_scene import FIELD_OF_VIEW, camera_position, show_map, triangle_colors
-from terrainkit.views.preview import MIN_SHADE, height_colors, shaded_relief
+from terrainkit.views.preview import height_colors, shaded_relief
 
 
 def make_map(preset):
@@ -67,15 +67,45 @@ def test_ground_has_the_colors_of_the_preview(server, shown):
     np.testing.assert_allclose(1 - v, x, atol=1e-6)
 
 
+def test_friction_is_hatched_and_explained(server, shown, monkeypatch):
+    pages = []
+    monkeypatch.setattr(server.gui, "add_html", pages.append)
+    icy = tk.SubTerrain(terrain="flat", friction=0.2)
+    terrain_map = tk.generate(tk.MapConfig(rows=1, cols=1, border=1.0, terrains=(icy,)))
+    show_map(server, terrain_map)
+    texture = np.asarray(read_glb(shown["/map/ground"]).visual.material.baseColorTexture)
+    is_dark = (texture == (40, 40, 46)).all(axis=-1)
+    assert np.diff(np.flatnonzero(is_dark[20, 10:90])).tolist() == [10] * 7
+    assert not is_dark[:10].any()  # the border
+    assert "hatched: friction 0.20" in pages[0]
+
+
+def test_slider_cuts_solids_off(server, shown, monkeypatch, solid_map):
+    sliders, add = [], server.gui.add_slider
+
+    def record(*words):
+        sliders.append(add(*words))
+        return sliders[-1]
+
+    monkeypatch.setattr(server.gui, "add_slider", record)
+    show_map(server, solid_map)
+    for cut, top in ((0.5, 0.5), (0.8, 0.6)):  # the box ends at 0.6 m
+        sliders[0].value = cut
+        assert read_glb(shown["/map/solids"]).vertices[:, 2].max() == pytest.approx(top)
+
+
 def test_triangles_are_colored_by_height_and_slope():
     # A level one at 0.4 m, and two steep ones that face the light and the other side.
     level = np.array([[0.0, 0.0, 0.4], [1.0, 0.0, 0.4], [0.0, 1.0, 0.4]])
     steep = np.array([[0.0, 0.0, 0.4], [0.0, 1.0, 0.4], [1.0, 0.0, -0.6]])
     color = height_colors(np.array(0.4))
     colors = triangle_colors(np.stack([level, steep[::-1], steep]))
-    np.testing.assert_allclose(colors, [color, MIN_SHADE * color, MIN_SHADE * color])
+    # Of the light (-0.55, 0.45, 0.7), with 0.15 of the contrast of the ground.
+    east, west = (1 + 0.15 * ((sign * 0.15) / np.sqrt(2) / 0.7 - 1) for sign in (1, -1))
+    below = height_colors(np.array(-0.6))  # the lowest corner
+    np.testing.assert_allclose(colors, [color, east * below, west * below])
     west = steep * [-1.0, 1.0, 1.0]
-    assert (triangle_colors(west[None])[0] > color).all()
+    assert (triangle_colors(west[None])[0] > below).all()
 
 
 @pytest.mark.parametrize("size", [(80.0, 80.0, 0.0), (8.0, 160.0, 3.0), (160.0, 8.0, 0.0)])
@@ -92,6 +122,7 @@ def test_camera_has_a_box_in_view(size):
     assert side == pytest.approx(0.85)
 
 
+@pytest.mark.filterwarnings("ignore:cells of 0.1 m:terrainkit.TerrainkitWarning")
 def test_labels_are_beside_the_patches_of_a_map_without_solids(server, shown):
     show_map(server, make_map("legged_gym"))
     labels = {name: call for name, call in shown.items() if "/labels/" in name}

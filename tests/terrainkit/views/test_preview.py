@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit.errors import ExportError
+from terrainkit.errors import ConfigError, ExportError
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.views.preview import (
     LEVELS,
@@ -19,10 +19,19 @@ from terrainkit.views.preview import (
     write_preview,
 )
 from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, make_blocks
+from terrainkit.views.storey import storey_map
 from tests.tables import read_table
 
 PAPER = (250, 249, 246)
 FLAT = tk.SubTerrain(terrain="flat")
+
+
+def texts_of(monkeypatch, *arguments, **options):
+    """Return the texts that a preview has."""
+    texts = []
+    monkeypatch.setattr(cv2, "putText", lambda *put: texts.append(put[1]))
+    render_preview(*arguments, **options)
+    return texts
 
 
 def map_of(*terrains, rows=1, cols=1, border=0.0, **options):
@@ -98,7 +107,7 @@ def test_color_levels_are_ends_and_color_stops():
 
 def test_height_colors_are_linear_between_stops():
     found = height_colors(np.array([-20.0, -0.2, 0.0, 0.95, 9.0]))
-    expected = [(38, 32, 44), (168, 179.5, 188), (224, 221, 208), (189, 141, 95), (116, 66, 46)]
+    expected = [(24, 22, 20), (187, 183.5, 172.5), (224, 221, 208), (189, 141, 95), (98, 48, 36)]
     np.testing.assert_allclose(found, expected)
 
 
@@ -215,7 +224,7 @@ def test_preview_draws_spawns_and_routes(solid_map):
         points = np.array([[1.0, y], [3.0, y]])
         return Route(points=points, place=place, label="no", is_passable=is_passable)
 
-    routes = [route(1.0, None, is_passable=True), route(3.0, (5.0, 3.0), is_passable=False)]
+    routes = [route(1.0, (2.0, 1.0), is_passable=True), route(3.0, (5.0, 3.0), is_passable=False)]
     color = render_with(solid_map, Solids.empty(), routes=routes)
     x, y, _ = solid_map.env_origins[0, 0]
     assert color(x, y).tolist() == [196, 40, 40]
@@ -223,6 +232,70 @@ def test_preview_draws_spawns_and_routes(solid_map):
     assert color(1.5, 3).tolist() == color(5, 3).tolist() == [200, 30, 30]
     label = [color(5 + dx / 100, 3 + dy / 100) for dx in range(10, 30) for dy in range(6, 17)]
     assert [40, 40, 46] in np.array(label).tolist()
+    assert color(5.08, 3.05).tolist() == list(PAPER)  # the box of the label
+    # A dot of 5 px and a cross of 14 px.
+    assert color(2.02, 1.03).tolist() == [30, 120, 60]
+    assert color(5.05, 3.0).tolist() != [200, 30, 30]
+
+
+def test_labels_of_routes_are_within_the_picture(solid_map):
+    at = tuple(np.array(solid_map.grid.upper) - 0.02)
+    route = Route(points=np.array([at, at]), place=at, label="no path", is_passable=False)
+    picture = render_preview(solid_map, 700, [route])
+    x, y = picture.shape[1] - RIGHT, slice(ABOVE + 3, ABOVE + 20)
+    assert (picture[y, x - 60 : x - 4] == (40, 40, 46)).all(axis=-1).any()
+    assert (picture[y, x : x + 19] == PAPER).all()  # up to the color bar
+
+
+@pytest.mark.parametrize(("friction", "spacing"), [(0.2, 10), (0.69, 20), (0.0, 6)])
+def test_ground_with_its_own_friction_is_hatched(monkeypatch, friction, spacing):
+    usual, slippery = map_of(FLAT), map_of(dataclasses.replace(FLAT, friction=friction))
+    line = render_preview(slippery, 320)[ABOVE + 10, LEFT + 10 : LEFT + 210]
+    dark = np.flatnonzero((line == (40, 40, 46)).all(axis=1))
+    assert np.diff(dark).tolist() == [spacing] * (len(dark) - 1)
+    assert (line[dark + 1] == PAPER).all()
+    assert np.ptp(render_preview(usual, 320)[ABOVE + 10, LEFT + 10 : LEFT + 210], axis=0).max() == 0
+    assert f"friction {friction:.2f}" in texts_of(monkeypatch, slippery)
+    assert not any("friction" in text for text in texts_of(monkeypatch, usual))
+    assert any(
+        "friction 0.5," in text for text in texts_of(monkeypatch, map_of(FLAT, static_friction=0.5))
+    )
+
+
+def test_solids_with_their_own_friction_are_hatched(monkeypatch, solid_map):
+    # Of the four solids, a box has a friction of 0.3: 12 px.
+    assert [t for t in texts_of(monkeypatch, solid_map) if "friction" in t] == ["friction 0.30"]
+    monkeypatch.undo()
+    color = render_with(solid_map, solid_map.solids)
+    dark = [i for i in range(24) if color(0.88 + i / 100, 6).tolist() == [40, 40, 46]]
+    assert np.diff(dark).tolist() == [12]
+
+
+def test_imported_maps_have_no_difficulty_and_no_seed(monkeypatch, pits):
+    texts = texts_of(monkeypatch, pits)
+    assert {"rows (x): difficulty", "2: d 1.00"} < {*texts}
+    config = dataclasses.replace(pits.config, mode="custom")
+    texts = texts_of(monkeypatch, dataclasses.replace(pits, config=config))
+    assert {"rows (x)", "2", "3 x 1 patches of 8 m x 8 m"} < {*texts}
+    assert not any("d 1.00" in text or "seed" in text for text in texts)
+
+
+def test_storey_has_its_floor_at_the_ground_and_walls_up_to_the_cut():
+    house = tk.SubTerrain(terrain="building", parameters={"storeys": 2, "riser": 0.15})
+    terrain_map = map_of(house)
+    for storey, floor in enumerate((0.0, 2.4)):
+        shown = storey_map(terrain_map, storey)
+        assert shown.solids.bounds()[1][:, 2].max() == pytest.approx(1.2, abs=1e-4)
+        x, y, *_ = shown.goals[~np.isnan(shown.goals[..., 0])][-1].tolist()
+        # There is no wall at a goal, and the floor above is not shown.
+        assert shown.scan([x, y, 9.0]) == pytest.approx(0.0, abs=1e-4)
+        assert terrain_map.scan([x, y, floor + 1.0]) == pytest.approx(floor, abs=1e-4)
+        # The middle of the outer wall at low y, 0.12 m thick.
+        assert shown.scan([5.0, 0.06, 9.0]) == pytest.approx(1.2, abs=1e-4)
+    with pytest.raises(ConfigError, match="storey: got 2; expected 0 to 1"):
+        storey_map(terrain_map, 2)
+    with pytest.raises(ConfigError, match="storey: got 0; expected a map with buildings"):
+        storey_map(map_of(FLAT), 0)
 
 
 def test_preview_shades_tilted_solids_and_hatches_hanging_ones(solid_map):

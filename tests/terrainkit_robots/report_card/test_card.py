@@ -58,6 +58,18 @@ def make_card(monkeypatch, quadruped_run, slopes_and_pits):
     return make
 
 
+def test_passed_level_has_the_friction_of_the_ground(make_card):
+    grade, ok = {"grade": (0.0, 0.2), "landing": 1.4}, [CROSSED, CROSSED]
+    slopes = [
+        SubTerrain(terrain="slope", name=name, parameters=grade, friction=friction)
+        for name, friction in (("dry", None), ("wet", 0.25), ("icy", (0.5, 0.1)))
+    ]
+    card = make_card(*[[ok, ok, ok]] * 3, terrain_map=make_map(*slopes))
+    texts = [test.passed_text for test in card["tests"]]
+    assert texts == ["2: grade 0.2", "2: grade 0.2, friction 0.25", "2: grade 0.2, friction 0.1"]
+    assert [level.parameters["friction"] for level in card["tests"][2].levels] == [0.5, 0.3, 0.1]
+
+
 def test_level_is_passed_with_every_easier_one(make_card):
     ok, fell, late = CROSSED, FELL, TIMED_OUT
     card = make_card([[ok, ok], [ok, fell], [ok, ok]], [[late, fell], [ok, ok], [ok, ok]])

@@ -1,12 +1,13 @@
 import multiprocessing
 import os
+import time
 
 import cv2
 import numpy as np
 import pytest
 
 from terrainkit.terrain import plugin_file
-from terrainkit_cli.worker_pool import worker_pool
+from terrainkit.terrain.worker_pool import worker_pool
 
 
 def test_worker_pool_of_one_is_this_process():
@@ -37,3 +38,9 @@ def test_worker_pool_imports_plugin_files_in_processes_that_are_not_forked(tmp_p
             assert executor.submit(plugin_file.plugin_files).result() == (path,)
     finally:
         multiprocessing.set_start_method(method, force=True)
+
+
+def test_worker_pool_does_not_wait_for_work_that_has_not_started():
+    with worker_pool(2) as executor:
+        futures = [executor.submit(time.sleep, 0.1) for _ in range(100)]
+    assert futures[-1].cancelled()

@@ -1,25 +1,41 @@
-"""A pool of processes for a command."""
+"""A pool of processes that build patches."""
 
 import signal
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
 
-def worker_pool(jobs: int) -> "AbstractContextManager[Executor | None]":
-    """Return the context of an executor of `jobs` processes; None for 1, which is this process."""
+@contextmanager
+def worker_pool(jobs: int) -> "Iterator[Executor | None]":
+    """Run processes, which end with the block, and with this process, however that ends.
+
+    They know the terrains of plugin files. On Linux, they also end with the thread that starts
+    them.
+
+    Args:
+        jobs: Number of processes.
+
+    Yields:
+        The executor, for `generate` and `TerrainStream`; None for 1 job, which is this process.
+    """
     if jobs == 1:
-        return nullcontext()
+        yield None
+        return
     from concurrent.futures import ProcessPoolExecutor
 
     from terrainkit.terrain.plugin_file import plugin_files
 
-    return ProcessPoolExecutor(jobs, initializer=_start_worker, initargs=(plugin_files(),))
+    executor = ProcessPoolExecutor(jobs, initializer=_start_worker, initargs=(plugin_files(),))
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 def _start_worker(plugins: "Sequence[Path]") -> None:
