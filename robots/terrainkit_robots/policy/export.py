@@ -107,7 +107,7 @@ def export_policy(
             exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
     names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE]
-    names += [ESTIMATOR_FILE] if run.task.policy.estimator_hidden_dims else []
+    names += [ESTIMATOR_FILE] if run.task.has_estimator else []
     names += [YAML_FILE] if deploy_yaml else []
     names += [EXAMPLE.name] if example else []
     files = tuple(folder / name for name in names)

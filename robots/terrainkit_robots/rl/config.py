@@ -436,7 +436,8 @@ class Policy(Config):
     """Widths of the hidden layers of the critic."""
     estimator_hidden_dims: HiddenDims | None = None
     """Widths of the hidden layers of an estimator of base linear velocity and foot contacts, which
-    is trained with the policy and whose estimates the policy observes; none for no estimator."""
+    is trained with the policy and whose estimates the policy observes; none for no estimator.
+    There is none beside a network of another class, or a student, in `runner.rsl_rl`."""
     # torch computes elu seven times as slowly as swish on a CPU: it took 34 % of an update.
     activation: Activation = "swish"
     """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""
@@ -561,6 +562,15 @@ class Task(Config):
             got = f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}"
             most = f"env.num_envs * runner.num_steps_per_env = {samples}"
             raise ConfigError(f"{got}; expected at most {most}")
+
+    @property
+    def has_estimator(self) -> bool:
+        """Whether the actor is an `EstimatorModel`."""
+        networks = self.runner.rsl_rl
+        actor = networks.get("actor")
+        is_other = isinstance(actor, Mapping) and "class_name" in actor
+        has_own_networks = is_other or "student" in networks
+        return self.policy.estimator_hidden_dims is not None and not has_own_networks
 
     @property
     def dt(self) -> float:

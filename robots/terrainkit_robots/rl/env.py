@@ -226,7 +226,7 @@ class LeggedEnv(VecEnv):
             "policy": observations.policy_terms(self),
             "privileged": observations.privileged_terms(self),
         }
-        if self.cfg.policy.estimator_hidden_dims is not None:
+        if self.cfg.has_estimator:
             groups[ESTIMATE] = observations.estimate_terms(self)
         return groups
 

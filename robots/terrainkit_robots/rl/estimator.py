@@ -20,8 +20,8 @@ NUM_EPOCHS, LEARNING_RATE = 2, 1e-3
 """Passes over the samples of an iteration, and the learning rate; that of PPO falls to 1e-5."""
 
 FORCED_ITERATIONS = 800
-"""Iterations in which the policy observes a mean of simulated and estimated values. The share of
-the simulated values falls from 1 to 0."""
+"""Iterations in which the policy observes a mean of simulated and estimated values, at most half of
+a training. The share of the simulated values falls from 1 to 0."""
 
 
 class EstimatorModel(MLPModel):
@@ -98,7 +98,7 @@ class _EstimatorMLP(torch.nn.Module):
 
 
 def estimator_update(
-    alg: Any, augment: Callable[[TensorDict], TensorDict]
+    alg: Any, augment: Callable[[TensorDict], TensorDict], forced_iterations: int
 ) -> Callable[[], dict[str, float]]:
     """Return the update of PPO, followed by an update of the actor's estimator.
 
@@ -108,6 +108,7 @@ def estimator_update(
     Args:
         alg: rsl-rl's PPO, whose actor is an `EstimatorModel`.
         augment: Adds samples to observations, such as their mirror images.
+        forced_iterations: Iterations in which the policy also observes simulated values.
     """
     update, actor = alg.update, alg.actor
 
@@ -130,7 +131,7 @@ def estimator_update(
                 total += loss.item()
         for group in alg.optimizer.param_groups:
             group["lr"] = alg.learning_rate
-        actor.forced.sub_(1 / FORCED_ITERATIONS).clamp_(min=0)
+        actor.forced.sub_(1 / max(1, forced_iterations)).clamp_(min=0)
         losses["estimator"] = total / (NUM_EPOCHS * alg.num_mini_batches)
         return losses
 

@@ -19,7 +19,7 @@ MAX_RESET_RELIEF = 0.06
 
 MAX_PUSH, BIPED_MAX_PUSH = 0.6, 0.29
 """Default of the largest velocity that a push adds along x and along y, in units of
-sqrt(g leg length): 1.26 m/s for the bundled quadruped, 0.75 m/s for two legs of 0.7 m."""
+sqrt(g leg length): 1.26 m/s for the bundled quadruped, 0.76 m/s for two legs of 0.7 m."""
 
 
 @dataclass(frozen=True, kw_only=True)

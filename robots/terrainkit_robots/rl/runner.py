@@ -26,7 +26,7 @@ from terrainkit_robots.checkpoint import (
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.env_state import env_state, load_env_state
-from terrainkit_robots.rl.estimator import EstimatorModel, estimator_update
+from terrainkit_robots.rl.estimator import FORCED_ITERATIONS, EstimatorModel, estimator_update
 from terrainkit_robots.rl.symmetry import augment, has_symmetry, mirrored_update
 
 _NETWORKS = "actor", "critic", "student", "teacher", "rnd"
@@ -163,7 +163,9 @@ class LeggedRunner(OnPolicyRunner):
         if isinstance(getattr(self.alg, "actor", None), EstimatorModel):
             mirrored = symmetry and symmetry.use_data_augmentation
             self.alg.update = estimator_update(
-                self.alg, lambda obs: augment(env, obs, None)[0] if mirrored else obs
+                self.alg,
+                lambda obs: augment(env, obs, None)[0] if mirrored else obs,
+                min(FORCED_ITERATIONS, env.cfg.runner.max_iterations // 2),
             )
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
@@ -410,9 +412,9 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
     network |= {"obs_normalization": policy.obs_normalization}
     distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
     actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
-    if policy.estimator_hidden_dims is not None:
+    if task.has_estimator:
         actor["class_name"] = "terrainkit_robots.rl.estimator:EstimatorModel"
-        actor["estimator_hidden_dims"] = list(policy.estimator_hidden_dims)
+        actor["estimator_hidden_dims"] = list(policy.estimator_hidden_dims or ())
     config = {
         "num_steps_per_env": runner.num_steps_per_env,
         "save_interval": sys.maxsize,  # `LeggedRunner.finish_iteration` saves, in all processes

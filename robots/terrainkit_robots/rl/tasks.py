@@ -151,16 +151,18 @@ def get_task(name_or_folder: str | Path) -> RegisteredTask:
 
 
 def default_task(spec: RobotSpec) -> Task:
-    """Return the task of an onboarded robot: of the bundled one with as many legs, scaled to it.
+    """Return the task of an onboarded robot: of the bundled `biped` or `quadruped`, scaled to it.
 
     Velocities are equal in units of sqrt(g leg length), and yaw rates in sqrt(g / leg length).
     """
     is_biped = len(spec.feet) == 2
     bundled_folder = Path(bundled.__file__).parent / ("biped" if is_biped else "quadruped")
     task = Task.load(bundled_folder / "tasks" / f"{bundled_folder.name}.toml")
-    specs = spec, RobotSpec.load(bundled_folder / SPEC_FILE)
-    own_leg, leg = (s.leg_length or s.base_height_target or 1.0 for s in specs)
-    length = own_leg / leg
+    reference = RobotSpec.load(bundled_folder / SPEC_FILE)
+    sizes = spec.leg_length, reference.leg_length
+    if not spec.leg_length:
+        sizes = spec.base_height_target, reference.base_height_target
+    length = (sizes[0] or 1.0) / (sizes[1] or 1.0)
     speed = math.sqrt(length)
     commands, randomization, rewards = task.commands, task.domain_rand, task.rewards
 

@@ -283,7 +283,7 @@ def test_estimator_learns_and_ppo_leaves_it_alone(make, task):
     obs, actor = runner.alg.storage.observations.flatten(0, 1), runner.alg.actor
     start = (actor.estimate(obs) - obs["estimate"]).square().mean()
     runner.alg.update = dict
-    update = estimator_update(runner.alg, lambda obs: obs)
+    update = estimator_update(runner.alg, lambda obs: obs, 800)
     losses = [update()["estimator"] for _ in range(30)]
     assert losses[-1] < 0.5 * start < 0.6 * losses[0]
     assert {group["lr"] for group in runner.alg.optimizer.param_groups} == {
@@ -292,6 +292,16 @@ def test_estimator_learns_and_ppo_leaves_it_alone(make, task):
     actions = actor(obs).sum()
     weights = [*actor.estimator.parameters()]
     assert torch.autograd.grad(actions, weights, allow_unused=True) == (None,) * len(weights)
+
+
+def test_network_of_another_class_has_no_estimator(make, task):
+    network = {"actor": {"class_name": "RNNModel", "rnn_type": "gru"}}
+    recurrent = replace(task.runner, rsl_rl=network)
+    policy = replace(task.policy, estimator_hidden_dims=(16,))
+    runner = make(replace(task, policy=policy, runner=recurrent), folder=None)
+    runner.learn(1)
+    assert runner.alg.actor.is_recurrent
+    assert set(runner.env.obs_sizes) == {"policy", "privileged"}
 
 
 def test_policy_observes_simulated_values_at_first(make, task):

@@ -128,7 +128,7 @@ class TestByHand:
         env.step(torch.zeros(2, 3))
         assert env.state.foot_air_time[1, 0] == pytest.approx(env.cfg.dt)
 
-    @pytest.mark.parametrize(("name", "most"), [("quadruped", 1.25), ("biped", 0.75)])
+    @pytest.mark.parametrize(("name", "most"), [("quadruped", 1.26), ("biped", 0.76)])
     def test_pushes_are_weaker_on_two_legs(
         self, request, nominal_env, no_randomization, name, most
     ):
