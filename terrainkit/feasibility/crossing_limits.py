@@ -72,7 +72,8 @@ class RobotLimits(Config):
     """Length of the body [m]; None if it is as long as it is wide. Only walking limits need it."""
 
     turning_width: Limit | None = None
-    """Width of the narrowest passage that is longer than the body [m]; None for `body_width`."""
+    """Width of the narrowest passage that is longer than the body [m]; None for `body_width`, or
+    in the walking limits for the diagonal of the body."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -80,6 +81,11 @@ class RobotLimits(Config):
             raise ConfigError(
                 f"crouched_height: got {self.crouched_height:g} m; expected less than the "
                 f"standing_height of {self.standing_height:g} m"
+            )
+        if self.turning_width and self.turning_width > 2 * self.body_width:
+            raise ConfigError(
+                f"turning_width: got {self.turning_width:g} m; expected at most twice the "
+                f"body_width of {self.body_width:g} m"
             )
 
     def walking(self) -> Self:
@@ -92,11 +98,14 @@ class RobotLimits(Config):
         upright, lowest = _WALKING_CLEARANCES
         factors = {name: factor * getattr(self, name) for name, factor in _WALKING.items()}
         foothold = max(self.foothold, min(factors.pop("foothold"), _MAX_WALKING_FOOTHOLD))
+        width = self.body_width * math.cos(_WALKING_YAW) + length * math.sin(_WALKING_YAW)
+        diagonal = math.hypot(length, self.body_width)
         return replace(
             self,
             foothold=foothold,
-            body_width=self.body_width * math.cos(_WALKING_YAW) + length * math.sin(_WALKING_YAW),
-            turning_width=math.hypot(length, self.body_width),
+            body_length=length,
+            body_width=width,
+            turning_width=self.turning_width or min(diagonal, 2 * width),
             standing_height=upright * self.standing_height,
             crouched_height=lowest * self.standing_height,
             **factors,
