@@ -17,7 +17,8 @@ def occupied_cells(
     Args:
         grid: Positions of the cells.
         heights: Heights of the ground [m], shape `grid.shape`.
-        solids: The solids, each of which is an obstacle in all cells that it overlaps.
+        solids: The solids, each of which is an obstacle in all cells that it overlaps; if it is
+            turned, not in those that it cuts only near a corner.
         low: Height up to which the robot steps on solids and over edges of the ground [m]. A cell
             of the ground is occupied if a neighbor, also a diagonal one, is lower by more.
         high: Height of the robot [m]; it passes below solids that begin there.

@@ -190,7 +190,9 @@ class TerrainStream:
             ConfigError: if a number is invalid.
         """
         episodes = {
-            convert("env_id", int(env_id), _Index): convert("episode", episode, _Index)
+            convert("env_id", int(env_id) if str(env_id).isdecimal() else env_id, _Index): convert(
+                "episode", episode, _Index
+            )
             for env_id, episode in state.items()
         }
         for env_id in list(self._ahead):

@@ -26,12 +26,12 @@ def format_numbers(*values: float) -> str:
 def short_repr(instance: Any) -> str:
     """Return a dataclass's `repr` with the shapes of arrays, and without values by default."""
     parts = []
-    for each in fields(instance):
-        value = getattr(instance, each.name)
+    for field in fields(instance):
+        value = getattr(instance, field.name)
         if hasattr(value, "shape"):
-            parts.append(f"{each.name}: {value.shape}")
-        elif value != each.default:
-            parts.append(f"{each.name}={truncate(repr(value))}")
+            parts.append(f"{field.name}: {value.shape}")
+        elif value != field.default:
+            parts.append(f"{field.name}={truncate(repr(value))}")
     return f"{type(instance).__name__}({', '.join(parts)})"
 
 

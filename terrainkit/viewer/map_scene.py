@@ -172,9 +172,12 @@ def _add_cut(server: "viser.ViserServer", terrain_map: "TerrainMap", handles: li
     slider = server.gui.add_slider("height cut [m]", float(low.min()), top, 0.1, top)
 
     def update(_: object) -> None:
+        is_visible = {handle.name: handle.visible for handle in handles}
         for handle in handles:
             handle.remove()
         handles[:] = _add_solids(server, terrain_map, slider.value)
+        for handle in handles:
+            handle.visible = is_visible.get(handle.name, True)
 
     slider.on_update(update)
 

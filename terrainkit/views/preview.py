@@ -301,7 +301,7 @@ def own_frictions(terrain_map: "TerrainMap") -> NDArray[np.float32]:
 def _draw_legend(image: Picture, terrain_map: "TerrainMap", *, has_routes: bool) -> None:
     """Explain the hatching and the routes in a line; of many frictions, three."""
     frictions, x = own_frictions(terrain_map), 0
-    for friction in np.unique(np.percentile(frictions, (0, 50, 100)) if len(frictions) else []):
+    for friction in np.unique(frictions[[0, len(frictions) // 2, -1]] if len(frictions) else []):
         swatch = image[:, x : x + 50]
         hatch_friction(swatch, np.full(swatch.shape[:2], friction, np.float32), np.nan)
         _write(image, f"friction {friction:.2f}", (x + 56, 16))
