@@ -43,3 +43,16 @@ def test_a_solid_occupies_each_cell_that_it_overlaps():
     assert cells(make_boxes((0.2, 0.15, 0.5), (0.02, 0.08, 1.0))) == [[1, 1], [2, 1]]
     assert cells(make_cylinders((0.33, 0.37, 0.5), 0.01, 1.0)) == [[3, 3]]
     assert cells(make_boxes((0.1, 0.05, 0.5), (0.2, 0.1, 1.0))) == [[0, 0], [1, 0]]
+
+
+def test_a_turned_wall_occupies_each_cell_that_it_overlaps():
+    grid = Grid(shape=(30, 30), cell=0.1)
+    wall = make_boxes((1.5, 1.5, 0.5), (2.0, 0.04, 1.0), rpy=(0.0, 0.0, np.pi / 4))
+    occupied = occupied_cells(grid, np.zeros(grid.shape, np.float32), wall, 0.1, 0.9)
+    along = np.linspace(-1, 1, 2001)[:, None] * np.sqrt([0.5, 0.5])
+    across = np.linspace(-0.02, 0.02, 41)[:, None] * np.sqrt([0.5, 0.5]) * [-1, 1]
+    points = 1.5 + 0.999 * (along[:, None] + across).reshape(-1, 2)
+    overlapped = np.zeros(grid.shape, bool)
+    overlapped[tuple((points // 0.1).astype(int).T)] = True
+    assert occupied[overlapped].all()
+    assert occupied.sum() < 2 * overlapped.sum()
