@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 _MAX_INDEX = 2**32
 """Number of environments, and of episodes of each: these have one word of a seed sequence."""
 
+# Python's pool waits forever for a process that was killed while it sent a result.
+_MAX_WAIT = 60.0
+"""Time after which a patch that an executor builds is late, so that the executor has failed [s]."""
+
 _Index = Annotated[int, Meta(ge=0, le=_MAX_INDEX - 1)]
 
 _BYTES_PER_SAMPLE = 8
@@ -213,7 +217,7 @@ class TerrainStream:
         patch = None
         if future := self._ahead[env_id].pop((terrain, difficulty), None):
             try:
-                patch = future.result()
+                patch = future.result(_MAX_WAIT)
             except Exception as error:
                 self._leave_executor(error)
         self._forget(env_id)

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
+# If a process was killed while it sent a result, Python's pool never ends the others.
+_MAX_WAIT = 10.0
+"""Time for the processes to finish what they do at the end [s]."""
+
 
 @contextmanager
 def worker_pool(jobs: int) -> "Iterator[Executor | None]":
@@ -35,7 +39,11 @@ def worker_pool(jobs: int) -> "Iterator[Executor | None]":
     try:
         yield executor
     finally:
-        executor.shutdown(cancel_futures=True)
+        processes = list(executor._processes.values())
+        executor.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.join(_MAX_WAIT)
+            process.kill()
 
 
 def _start_worker(plugins: "Sequence[Path]") -> None:
