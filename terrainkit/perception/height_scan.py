@@ -116,6 +116,8 @@ class HeightScan:
         surface: TerrainMap | Heights,
         x: Sequence[float] = SCAN_X,
         y: Sequence[float] = SCAN_Y,
+        *,
+        points: ArrayLike | None = None,
     ) -> None:
         """Prepare a scan of k = len(x) len(y) points; the index along y is the last one.
 
@@ -124,14 +126,16 @@ class HeightScan:
                 scans can share.
             x: Points ahead of the robot [m].
             y: Points to the left of the robot [m].
+            points: Points ahead and to the left in place of this grid [m], shape (k, 2).
 
         Raises:
-            ConfigError: if a point is not a finite number.
+            ConfigError: if a point is not a finite number, or a shape is wrong.
         """
         self.surface = exact_surface(surface) if isinstance(surface, TerrainMap) else surface
-        axes = (to_floats(name, values, [None]) for name, values in (("x", x), ("y", y)))
-        points = np.stack([coordinate.ravel() for coordinate in np.meshgrid(*axes, indexing="ij")])
-        self.offsets = points.astype(np.float32)
+        if points is None:
+            axes = (to_floats(name, values, [None]) for name, values in (("x", x), ("y", y)))
+            points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        self.offsets = to_floats("points", points, [None, 2]).T.astype(np.float32, order="C")
 
     def points(self, position: Array, yaw: ArrayLike) -> tuple[Array, Array, Array]:
         """Return x, y and z of the points on the surface [m], shape (n, k) each; see `below`.

@@ -417,12 +417,11 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     feet = [model.body(foot).id for foot in robot.spec.feet]
     soles = env.scene.geoms[np.isin(model.geom_bodyid[env.scene.geoms], feet)]
     friction = np.max(model.geom_friction[soles, 0], initial=0)
-    scan_x, scan_y = task.terrain.measured_points_x, task.terrain.measured_points_y
     scan = {
         "frame": "at the base's position, turned by its yaw alone; x forward, y left",
         "value": "height of the base above the ground at the point",
         "unit": "m",
-        "points": [[x, y] for x in scan_x for y in scan_y],
+        "points": np.round(env.scan_points, 6).tolist(),
     }
     gait = {"period": float(env.gait.period), "min_yaw_rate": MIN_YAW_RATE}
     names = "name", "base", "spawn_height", "base_height_target"
@@ -454,7 +453,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "contact": {"friction": float(f"{friction:.7g}")},
         "feet": {"name": list(robot.spec.feet), "contact_force": CONTACT_FORCE},
         "gait": gait if env.gait.period else None,
-        "height_scan": scan if env.state.height_scan.shape[1] else None,
+        "height_scan": scan if env.has_height_scan else None,
     }
 
 

@@ -25,7 +25,7 @@ from terrainkit_robots.rl.own_terms import checked
 from terrainkit_robots.rl.rewards import REWARDS, Reward, is_moving, scaled_rewards
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
-from terrainkit_robots.rl.state import Sensors, State
+from terrainkit_robots.rl.state import Sensors, State, scan_points
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import TERMINATIONS
 from terrainkit_robots.rl.terrain import Ground
@@ -123,10 +123,12 @@ class LeggedEnv(VecEnv):
         self.scene = Scene(robot, terrain, task)
         self.has_height_scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
         self.history_length = observations.history_length(task, robot)
+        points = scan_points(task.terrain, self.scene.foot_pos)
+        self.scan_points = points if self.has_height_scan else points[:0]
         check_env_memory(
             task,
             robot,
-            scan=self.has_height_scan,
+            points=len(self.scan_points),
             history=self.history_length - 1,
             ngeom=self.scene.model.ngeom,
         )
@@ -142,7 +144,7 @@ class LeggedEnv(VecEnv):
             task,
             averaging_time=self.gait.averaging_time,
             leg_length=robot.leg_length,
-            scan=self.has_height_scan,
+            points=self.scan_points,
         )
         self.actions = JointActions(robot, task.control, self.scene.model)
         self.num_actions = len(self.actions.joints)

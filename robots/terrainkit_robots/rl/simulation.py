@@ -124,14 +124,13 @@ class Simulation:
         return values.reshape(len(values), -1, 3)
 
 
-def check_env_memory(task: Task, robot: Robot, *, scan: bool, history: int, ngeom: int) -> None:
+def check_env_memory(task: Task, robot: Robot, *, points: int, history: int, ngeom: int) -> None:
     """Raise MemoryLimitError if training needs more memory than is free, within a factor of two."""
     joints = len(robot.default_pose)
     steps = task.runner.num_steps_per_env
     policy = task.policy
-    points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
     num_envs = task.env.num_envs
-    observations = 45 + 7 * joints + 2 * scan * points + history * (20 + 3 * joints)
+    observations = 45 + 7 * joints + 2 * points + history * (20 + 3 * joints)
     hidden = sum(policy.actor_hidden_dims + policy.critic_hidden_dims)
     samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry is not False))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))

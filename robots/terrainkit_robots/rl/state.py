@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.perception.height_scan import HeightScan
 from terrainkit.perception.orientation import projected_gravity, quat_to_yaw
-from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.config import Task, Terrain
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
@@ -78,6 +78,22 @@ class State:
             getattr(self, field.name)[env_ids] = getattr(other, field.name)
 
 
+def scan_points(cfg: Terrain, foot_pos: FloatArray) -> FloatArray:
+    """Return the points of the height scan: those of the grid by x, then those around each foot.
+
+    Args:
+        cfg: The coordinates.
+        foot_pos: Default positions of the feet in the frame of the base [m], shape (f, 3).
+
+    Returns:
+        Points ahead and to the left of the robot [m], shape (k, 2).
+    """
+    grid = np.array([(x, y) for x in cfg.measured_points_x for y in cfg.measured_points_y])
+    near = np.array([(x, y) for x in cfg.foot_points_x for y in cfg.foot_points_y]).reshape(-1, 2)
+    around = foot_pos[:, None, :2] + near
+    return np.concatenate([grid, around.reshape(-1, 2)])
+
+
 class Sensors:
     """Measure n robots."""
 
@@ -89,13 +105,22 @@ class Sensors:
         *,
         averaging_time: float,
         leg_length: float,
-        scan: bool,
+        points: FloatArray,
     ) -> None:
+        """Prepare the sensors.
+
+        Args:
+            sim: The simulations.
+            terrain: The terrain under the robots.
+            task: The task.
+            averaging_time: Time over which `mean_vel` is averaged [s].
+            leg_length: Length of the legs [m].
+            points: Points of the height scan [m], shape (k, 2); none for no height scan.
+        """
         self._sim, self._terrain = sim, terrain
         self._dt = np.float32(task.dt)
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
-        x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
-        self._scan = HeightScan(terrain, x if scan else (), y)
+        self._scan = HeightScan(terrain, points=points)
         self._near_foot = np.float32(NEAR_FOOT * leg_length) * _NEAR_POINTS
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, PluginError, listing
-from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.observations import SignedPermutation
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.spec.robot_arrays import Robot
@@ -69,7 +68,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
             width, start = term.function(env).shape[1], len(index)
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
-                maps["scan"] = _scan_map(env.cfg.terrain)
+                maps["scan"] = _scan_map(env.scan_points)
             if term.symmetry == "history":  # repeats the terms before it
                 repeated = index + np.arange(0, width, start)[:, None]
                 maps["history"] = _map(repeated.ravel(), np.tile(sign, len(repeated)))
@@ -209,13 +208,12 @@ def _foot_maps(robot: Robot, scene: Scene) -> dict[str, SignedPermutation]:
     return {"feet": vectors, "contacts": _map(index, np.ones(len(feet)))}
 
 
-def _scan_map(cfg: Terrain) -> SignedPermutation:
-    """Return the map of the height scan, whose points are ordered by x, then y."""
-    lateral = np.array(cfg.measured_points_y)
-    error = np.abs(lateral[:, None] + lateral)
-    for k in np.flatnonzero(error.min(axis=1) > TOLERANCE):
-        got = f"terrain.measured_points_y: got {lateral[k]:g} without {-lateral[k]:g}"
-        raise ConfigError(f"{got}; symmetry expects the same points on both sides")
-    # Each point takes the height at the same x and the opposite y.
-    index = np.arange(len(cfg.measured_points_x))[:, None] * len(lateral) + error.argmin(axis=1)
-    return _map(index.ravel(), np.ones(index.size))
+def _scan_map(points: FloatArray) -> SignedPermutation:
+    """Return the map of the height scan: each point takes the height at the opposite side."""
+    mirrored = points * (1, -1)
+    distance = np.linalg.norm(mirrored[:, None] - points, axis=2)
+    for k in np.flatnonzero(distance.min(axis=1) > TOLERANCE):
+        got = "height scan: got a point at x = {:g} m, y = {:g} m".format(*points[k])
+        expected = "as symmetry has the same points on both sides"
+        raise ConfigError(f"{got}; expected another at y = {mirrored[k, 1]:g} m, {expected}")
+    return _map(distance.argmin(axis=1), np.ones(len(points)))

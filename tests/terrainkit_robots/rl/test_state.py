@@ -90,6 +90,17 @@ class TestByHand:
         np.testing.assert_allclose(x, [[1.2, 0.9], [0.7, 0.7]], atol=1e-6)
         np.testing.assert_allclose(y, [[2.3, 2.3], [2.2, 1.9]], atol=1e-6)
 
+    def test_scan_has_points_around_the_feet(self, quadruped, nominal_env, map_ground):
+        grid = {"measured_points_x": (0.3,), "measured_points_y": (0.0,)}
+        points = Terrain(**grid, foot_points_x=(-0.1, 0.2), foot_points_y=(0.0, 0.05))
+        env = nominal_env(1, map_ground, robot=quadruped, terrain=points)
+        x, y, _ = env.sensors.scan_points(np.float32([[1, 2, 0.5]]), np.float32([[1, 0, 0, 0]]))
+        assert (x[0, 0], y[0, 0]) == pytest.approx((1.3, 2.0))
+        at_feet = np.stack([x[0, 1:], y[0, 1:]], axis=1).reshape(4, 4, 2) - (1, 2)
+        offsets = at_feet - env.scene.foot_pos[:, None, :2]
+        expected = [[-0.1, 0], [-0.1, 0.05], [0.2, 0], [0.2, 0.05]]
+        np.testing.assert_allclose(offsets, [expected] * 4, atol=1e-6)
+
     def test_steps_are_compared_with_the_previous_one(self, nominal_env, cart):
         env = nominal_env(2, robot=cart)
         before = env.state.dof_vel.copy()

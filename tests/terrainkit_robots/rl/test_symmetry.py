@@ -43,6 +43,7 @@ def make_env(request, nominal_env):
             commands=Commands(gait_period=0.4),
             domain_rand=DomainRand(push_interval_s=0.0, action_delay=None),
             sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
+            terrain=sections.Terrain(foot_points_x=(-0.1, 0.2), foot_points_y=(-0.05, 0.05)),
         )
 
     return make
@@ -134,7 +135,7 @@ class TestRobot:
             assert not env.state.fallen.any()
         assert touched
         scan = env.state.height_scan
-        assert scan.shape[1] == 187 * more
+        assert scan.shape[1] == (187 + 4 * len(env.robot.spec.feet)) * more
         assert not more or not np.allclose(scan[0], scan[_PAIRS])
         assert_images(env, mirror, 2e-3)
         image = env.sim.qpos[:_PAIRS].copy()
@@ -210,7 +211,7 @@ class TestErrors:
     def test_asymmetric_scan_is_rejected(self, env):
         terrain = sections.Terrain(measured_points_y=(-0.5, 0.0, 0.4))
         leaning = LeggedEnv(replace(env.cfg, terrain=terrain), env.robot, Valley())
-        with pytest.raises(ConfigError, match=r"measured_points_y: got -0\.5 without 0\.5"):
+        with pytest.raises(ConfigError, match=r"y = -0\.5 m; expected another at y = 0\.5 m"):
             _ = leaning.mirror_maps
 
     def test_wrong_term_width_is_rejected(self, env):
