@@ -434,6 +434,10 @@ class Policy(Config):
     # mirrored samples and with 512 environments, needed 2.77 M samples instead of 0.75 M.
     init_noise_std: PositiveFloat = 0.7
     """Initial standard deviation of the actions."""
+    # `quadruped_map` climbed higher after every reduction of its noise, and early ones slow it.
+    final_noise_std: PositiveFloat | None = None
+    """Largest standard deviation of the actions in the last quarter of the training; in the third
+    quarter, the limit falls linearly to it from `init_noise_std`. None: no limit."""
     # On a CPU, networks cost more than the physics. legged_gym has 512, 256 and 128.
     actor_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the actor."""

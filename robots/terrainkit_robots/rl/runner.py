@@ -203,6 +203,7 @@ class LeggedRunner(OnPolicyRunner):
 
     def finish_iteration(self, iteration: int, collect_time: float, learn_time: float) -> None:
         """Report the progress, write a checkpoint if one is due, and stop if requested."""
+        self._limit_noise(iteration)
         self._completed, self.collect_time, self.learn_time = iteration, collect_time, learn_time
         if self.is_main_process and self._progress_callback is not None:
             self._progress_callback(self)
@@ -211,6 +212,19 @@ class LeggedRunner(OnPolicyRunner):
             self.save()
         if stop:
             raise _Stop
+
+    def _limit_noise(self, iteration: int) -> None:
+        """Limit the standard deviation of the actions as `policy.final_noise_std` says."""
+        policy = self.env.cfg.policy
+        if policy.final_noise_std is None:
+            return
+        noise = getattr(self.alg.get_policy().distribution, "std_param", None)
+        if noise is None:
+            expected = "expected none for a network without `std_param`"
+            raise ConfigError(f"policy.final_noise_std: got {policy.final_noise_std:g}; {expected}")
+        quarters = 4 * iteration / self.env.cfg.runner.max_iterations
+        limit = np.interp(quarters, [2, 3], [policy.init_noise_std, policy.final_noise_std])
+        noise.data.clamp_(max=float(limit))
 
     def _continue_alone(self, error: RuntimeError) -> None:
         """Save a checkpoint after another process of torchrun has ended, and stop.

@@ -128,6 +128,19 @@ def test_checkpoints_at_intervals_and_at_end(make, task, tmp_path, capfd):
     assert len(list(tmp_path.glob("events.out.tfevents.*"))) == 1
 
 
+def test_noise_is_limited_from_the_middle_to_the_last_quarter(make, task):
+    policy = replace(task.policy, init_noise_std=0.7, final_noise_std=0.1)
+    limited = replace(task, policy=policy, runner=replace(task.runner, max_iterations=8))
+    largest = []
+
+    def record(runner):
+        largest.append(float(runner.alg.get_policy().distribution.std_param.max()))
+
+    make(limited, progress_callback=record).learn(8)
+    assert min(largest[:4]) > 0.5
+    np.testing.assert_array_less(largest[4:], np.array([0.4, 0.1, 0.1, 0.1]) + 1e-6)
+
+
 def test_writer_of_the_log_is_closed_and_stopped(make):
     logger = make().logger
     logger.writer = writer = Mock(spec=WandbLogWriter)
