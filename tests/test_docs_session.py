@@ -69,7 +69,7 @@ FRAMEWORK_BLOCKS = [
 
 FRAMEWORK_PAGES = (
     *("isaaclab.md", "legged_gym.md", "leggedgym_ex.md", "mjlab.md", "mujoco.md", "newton.md"),
-    *("genesis.md", "pybullet.md", "playground.md", "gymnasium.md", "onboarding.md"),
+    *("genesis.md", "pybullet.md", "playground.md", "gymnasium.md", "onboarding.md", "levels.md"),
 )
 
 REPLACED = read_table(__file__, "replaced")
@@ -110,7 +110,7 @@ def test_each_replacement_is_for_a_line_of_a_page():
 def test_blocks_import_what_the_adapters_define():
     text = "\n".join(block for _, block in blocks_of_pages())
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", text, re.MULTILINE)
-    assert len(imports) == 10, "count the import of the new adapter here"
+    assert len(imports) == 11, "count the import of the new adapter here"
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
         nodes = ast.parse(path.read_text()).body

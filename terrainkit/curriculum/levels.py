@@ -21,7 +21,7 @@ def update_levels(
     An environment moves up with a progress of 1, and down with a progress below 1/2. Otherwise it
     stays. An environment that moves up from the last row is assigned one of the last `top_levels`
     rows at random. legged_gym assigns any row instead, which keeps the mean level of a solved
-    curriculum at half of the maximum.
+    curriculum at two thirds of the last row.
 
     Args:
         levels: Current levels, shape (n,).

@@ -4,14 +4,17 @@ Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs 
 """
 
 import importlib
+import os
 import sys
 from dataclasses import replace
 from importlib.metadata import distribution, version
 from pathlib import Path
 from types import ModuleType
 
+from pages import page_block
 from stand_ins import StandIns
 
+import terrainkit
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.isaaclab import config_text
@@ -52,6 +55,16 @@ for name, foot in (("quadruped", ".*_foot"), ("biped", ".*_ankle_roll_link")):
     module, _, made = f"{config.velocity_env_cfg.__package__}{agent}".partition(":")
     path = (source / "isaaclab_tasks").joinpath(*module.split(".")).with_suffix(".py")
     assert f"class {made}(" in path.read_text(), (module, made)
+
+# The lines of the pages change a task.
+os.chdir(sys.argv[1])
+terrainkit.generate(terrainkit.MapConfig(rows=2, preset="legged_gym")).save("map.npz")
+exec(page_block("levels.md", "resampling_time_range"), {"env_cfg": task})
+exec(page_block("isaaclab.md", "self.scene.terrain"), {"self": task})
+task.validate()
+assert task.commands.base_velocity.heading_command
+assert task.scene.terrain.terrain_generator.num_rows == 2
+assert task.curriculum.terrain_levels.func.__module__ == "terrainkit.integrations.isaaclab"
 
 # Joints without stiffness, such as wheels, have velocity targets.
 spec = result.robot.spec

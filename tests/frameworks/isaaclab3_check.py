@@ -146,7 +146,7 @@ def environment(terrain, use_mujoco_contacts=False, use_curriculum=False):
     """Make the environment on a terrain."""
     cfg = env_cfg(terrain, use_mujoco_contacts)
     if use_curriculum:
-        exec(page_block("isaaclab.md", "use_terrain_curriculum(env"), {"env_cfg": cfg})
+        exec(page_block("levels.md", "use_terrain_curriculum(env"), {"env_cfg": cfg})
     with launch_simulation(cfg=cfg, launcher_args=argparse.Namespace(device="cpu", headless=True)):
         env = ManagerBasedRLEnv(cfg)
         yield env

@@ -16,6 +16,7 @@ from pythons import find_python
 
 FOLDER = Path(__file__).parent
 GYMNASIUM = ["-e", f"{FOLDER.parents[1]}[gymnasium]"]
+LEGGED_GYM = ["torch==2.4.1", "numpy<1.24", "scipy", "matplotlib", "tensorboard"]
 PACKAGES = {
     "mjlab": [["mjlab==1.6.0"]],
     "pybullet": [["pybullet==3.2.7"]],
@@ -38,15 +39,20 @@ PACKAGES = {
         ["wandb", "tensorboard", "pandas", "xlsxwriter", "pygame", "warp-lang"],
     ],
     "works": [["torch", "trimesh", "scipy", "mujoco", "pandas"]],
-    "legged_gym": [["torch==2.4.1", "numpy<1.24", "scipy", "matplotlib", "tensorboard"]],
+    "legged_gym": [LEGGED_GYM],
+    "unitree_rl_gym": [LEGGED_GYM],
 }
 """Arguments of `pip install` for each check."""
 
-CHECKOUTS = {"leggedgym_ex": "LEGGEDGYM_EX", "legged_gym": "LEGGED_GYM"}
+CHECKOUTS = {
+    "leggedgym_ex": "LEGGEDGYM_EX",
+    "legged_gym": "LEGGED_GYM",
+    "unitree_rl_gym": "UNITREE_RL_GYM",
+}
 """Variable with the folder of a framework that is no package. The check runs beside its
 environment, in which terrainkit is not installed."""
 
-PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12", "drake": "3.12"}
+PYTHONS = {"legged_gym": "3.8", "unitree_rl_gym": "3.8", "isaaclab3": "3.12", "drake": "3.12"}
 """Version of Python of an environment, where it is not the version that runs this program."""
 
 FOLDERS = CHECKOUTS | {"works": "WORKS"}
