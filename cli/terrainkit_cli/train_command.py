@@ -187,9 +187,12 @@ def _print_result(runner: "LeggedRunner", task: "Task", task_file: Path | None) 
         render.result(f"continue: terrainkit train --resume {run}")
         return
     render.result(f"trained {count(whole, 'iteration')}: {folder}")
+    average = ""
+    if whole >= 7 * task.runner.save_interval:  # `average` takes 7 checkpoints by default
+        average = f"      terrainkit average {run} -o {folder}_mean  (mean of checkpoints)\n"
     render.result(
         f"next: terrainkit play {run}  (record a video)\n"
-        f"      terrainkit evaluate {run}  (measure it)\n"
+        f"      terrainkit evaluate {run}  (measure it)\n{average}"
         f"      terrainkit export {run}  (ONNX, TorchScript)\n"
         f"      tensorboard --logdir {folder}  (learning curves)"
     )
