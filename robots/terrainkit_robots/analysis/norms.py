@@ -39,7 +39,6 @@ _MIN_THICKNESS = 0.2
 _LEG_ROLES = ("hip", "thigh", "shank", "foot")
 """Roles of the links of legs, whose masses count for all legs together."""
 
-
 QUANTITIES = {
     "mass": ("mass over cubed leg length", "kg/m3"),
     "mass share": ("share of the mass of the robot", ""),
@@ -69,8 +68,8 @@ LEVELS = (0.0, 0.01, 0.02, 0.05, 0.25, 0.5, 0.75, 0.95, 0.98, 0.99, 1.0)
 """Shares of robots at which norms.toml gives values."""
 
 _MARGIN = 2.0
-"""How many times beyond the values of 90 % of the robots a value is unusual. Of 44 held-out robots
-without errors, 14 have such values; at 1.25 times they would be 21."""
+"""How many times beyond the values of 90 % of the robots a value is unusual. Of 39 held-out robots
+without errors, 14 have such values (benchmarks/results/robot_norms.md)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +218,9 @@ def _joint_values(
         "effort": effort / weight,
         "stiffness": stiffness / weight,
         "damping": damping / weight,
-        "friction": max(joint.friction / effort, _MIN_FRICTION) if effort > 0 else 0.0,
+        "friction": max(joint.friction / effort, _MIN_FRICTION)
+        if min(effort, joint.friction) > 0
+        else 0.0,
         "damped speed": min(effort / joint.damping, _MAX_DAMPED_SPEED)
         if joint.damping > 0
         else 0.0,
