@@ -13,6 +13,9 @@ _MIN_RANGE, _MIN_VELOCITY, _MIN_ACCELERATION = 8.0, 6.0, 4.0
 below the range (a fruit fly), 4 times below the velocity (Romeo) and 2 times below the
 acceleration."""
 
+_MAX_UNIT_COMMAND = 5.0
+"""Largest command of a motor that may be a normalized action instead of a torque."""
+
 
 @cached_fact
 def _samples(robot: Facts) -> Sequence[Sample]:
@@ -136,8 +139,9 @@ def unusual_effort(robot: Facts) -> Violations:
     """The effort limit of a joint is unusual for the weight and the size of the robot.
 
     The number is in another unit, such as kg cm, or is a placeholder. A policy learns to jump with
-    torques that the motor does not have. It is a warning if it is far too large for a leg, except
-    in MJCF, since benchmark models such as the ant of Gymnasium have such motors on purpose.
+    torques that the motor does not have. It is a warning if it is too large for a leg. In MJCF this
+    is only a note, since benchmark models such as the ant of Gymnasium have such motors, unless a
+    gear multiplies a control range that is a torque of the joint already.
 
     Fix:
         Give the peak torque of the motor after the gear, in N m.
@@ -146,9 +150,12 @@ def unusual_effort(robot: Facts) -> Violations:
         docs/robot_norms.py. Effort over weight times leg length, or over weight times the size of
         a robot without legs.
     """
-    explained = ("JNT009", "JNT011", "JNT015")
-    is_mjcf = robot.model.kind == "mjcf"
-    yield from _unusual(robot, ("effort",), explained, above=math.inf if is_mjcf else 1.0)
+    is_torque = any(
+        abs(motor.gear) > 1 and max(map(abs, motor.commands or (0.0,))) > _MAX_UNIT_COMMAND
+        for motor in robot.model.actuators
+    )
+    above = 1.0 if is_torque or robot.model.kind != "mjcf" else math.inf
+    yield from _unusual(robot, ("effort",), ("JNT009", "JNT011", "JNT015"), above=above)
 
 
 @rule("NRM006", "unusual-velocity", "note")
