@@ -62,6 +62,10 @@ class CheckRobot(Command):
     output: OutputPath | None = None
     """Write the report to this file. An existing file is replaced."""
 
+    picture: Annotated[Path, option("FILE")] | None = None
+    """Write a PNG that shows the masses, limits and gains of the robot among those of published
+    robots. An existing file is replaced."""
+
     select: Annotated[tuple[str, ...], option("CODES", is_repeated=True)] = ()
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
@@ -123,10 +127,11 @@ class CheckRobot(Command):
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         settings = self._settings()
         files = self._find_files(settings)
-        if len(files) > 1 and (self.against or self.spec or self.feet):
-            raise ConfigError(f"--against, --spec and --feet: got {len(files)} files; expected one")
-        if self.output:
-            _check_output(self.output, [Path(name) for name in files])
+        if len(files) > 1 and (self.against or self.spec or self.feet or self.picture):
+            options = "--against, --spec, --feet and --picture"
+            raise ConfigError(f"{options}: got {len(files)} files; expected one")
+        for output in filter(None, (self.output, self.picture)):
+            _check_output(output, [Path(name) for name in files])
         baseline = self._read_baseline()
         results = [result for name in files if (result := self._check_file(name, settings))]
         if self.write_baseline:
@@ -135,6 +140,13 @@ class CheckRobot(Command):
             render.note(f"wrote {baseline.path}")
         results = [replace(result, report=baseline.accept(result.report)) for result in results]
         self._print([result.report for result in results], "".join(r.diff for r in results))
+        if self.picture and results:
+            from terrainkit.files.atomic_write import atomic_write
+            from terrainkit_robots.rendering.norms_picture import draw_norms
+
+            with atomic_write(self.picture, overwrite=True) as path:
+                path.write_bytes(draw_norms(results[0].report.facts))
+            render.note(f"wrote {self.picture}")
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
             render.error(f"{rule.code}: {rule.reason}")

@@ -100,6 +100,13 @@ def test_check_robot_output_replaces_file(check, folder):
     assert {path.suffix for path in folder.iterdir()} == {".urdf", ".json"}
 
 
+def test_check_robot_picture_replaces_file(check, folder):
+    (folder / "picture.png").write_text("before")
+    assert check("good.urdf --picture picture.png").returncode == 0
+    assert (folder / "picture.png").read_bytes().startswith(b"\x89PNG")
+    assert check("good.urdf --picture good.urdf").returncode == 2
+
+
 def test_check_robot_xacro_arguments_and_packages(check, folder):
     (folder / "parts").mkdir()
     (folder / "parts" / "trunk.urdf").write_text(GOOD)

@@ -82,7 +82,7 @@ SIZE = Quantity(
 # Medians: 0.85 to 8 rad.
 RANGE = Quantity(
     typical=2.0,
-    limits=(0.1, 12.6),  # of JNT018 and JNT008
+    limits=(0.1, 12.6),  # the largest one of JNT008
     units={57.3: "degrees", 1 / 57.3: "radians that were converted from degrees twice"},
 )
 """Range of a hinge [rad]."""
@@ -90,7 +90,7 @@ RANGE = Quantity(
 # Medians: 0.12 to 0.82.
 EFFORT = Quantity(
     typical=0.4,
-    limits=(0.005, 5.0),  # the largest one of JNT026
+    limits=(0.005, 5.0),  # the largest one of leg joints, as in NRM005
     units={1e3: "N mm", 1e2: "N cm", 10.2: "kg cm", 1e-3: "kN m"},
 )
 """Effort of a leg joint over weight times leg length."""

@@ -106,6 +106,11 @@ FAMILIES = {
         title="left-right symmetry", needs=(*COMPLETE, "length-unit"), certainty="likely"
     ),
     "NAM": Family(title="names"),
+    "NRM": Family(
+        title="comparison with published robots",
+        needs=("complete-tree", "length-unit"),
+        certainty="likely",
+    ),
     "XRF": Family(title="comparison with another file or with the spec"),
     "SIM": Family(title="simulator compatibility"),
     "OPT": Family(title="physics options of MJCF", needs=("all-files",)),
@@ -117,7 +122,7 @@ IMPORTANCE = (
     "UNI",  # one cause of many findings
     *("XML", "TRE", "SIM", "MSH"),  # the robot cannot be loaded
     *("OPT", "INR", "JNT", "COL", "DYN"),  # its physics are wrong
-    *("LEG", "XRF", "SYM", "NAM"),  # it is not what was meant
+    *("LEG", "XRF", "SYM", "NAM", "NRM"),  # it is not what was meant
 )
 """Families in the order of reports: the most important first."""
 

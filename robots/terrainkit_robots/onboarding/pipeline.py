@@ -14,7 +14,7 @@ from terrainkit_robots.onboarding.frameworks.frameworks import check_framework, 
 from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import check_and_repair
-from terrainkit_robots.onboarding.result import OnboardResult
+from terrainkit_robots.onboarding.result import PUBLISHED, OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown
 from terrainkit_robots.spec.loops import LoopSpec, load_spec
 
@@ -109,6 +109,7 @@ def _write_folder(
     """Write the folder, and return the result with its verification, pictures and edited files."""
     from terrainkit_robots.onboarding.verify import verify
     from terrainkit_robots.rendering.child_process import RenderError
+    from terrainkit_robots.rendering.norms_picture import draw_norms
     from terrainkit_robots.rendering.robot_images import render_robot
 
     assert result.robot is not None
@@ -143,6 +144,11 @@ def _write_folder(
                 images[f"report/{name}.png"] = image
         except RenderError as error:
             images, images_error = {}, str(error)
+        if options.render_images:
+            spec = result.robot.spec
+            damping = spec.per_joint("damping")
+            gains = {name: (kp, damping[name]) for name, kp in spec.per_joint("stiffness").items()}
+            images[PUBLISHED] = draw_norms(result.report.facts, gains)
         write_files(folder, {**images, **edits})
         result = replace(
             result,

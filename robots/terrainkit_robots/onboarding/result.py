@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.verify import Verification
 
 
+PUBLISHED = "report/published.png"
+"""Name of the picture of the robot among published ones."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnboardResult:
     """The outcome of `onboard`."""

@@ -23,12 +23,12 @@ from terrainkit_robots.onboarding.comparison import NUM_STATES, error_text
 from terrainkit_robots.onboarding.frameworks.frameworks import reads_mjcf
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
+from terrainkit_robots.onboarding.result import PUBLISHED, OnboardResult
 from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, display_path, names
 
 if TYPE_CHECKING:
     from terrainkit_robots.onboarding.convert import RobotFiles
-    from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import StandResult
 
@@ -399,14 +399,17 @@ def _standing_rows(
 
 
 def _pictures(result: "OnboardResult") -> Iterator[str]:
-    if result.images:
-        titles = [PurePath(name).stem for name in result.images]
-        images = [f"![{cell(t)}]({n})" for t, n in zip(titles, result.images, strict=True)]
+    rendered = [name for name in result.images if name != PUBLISHED]
+    if rendered:
+        titles = [PurePath(name).stem for name in rendered]
+        images = [f"![{cell(t)}]({n})" for t, n in zip(titles, rendered, strict=True)]
         yield f"| {' | '.join(map(cell, titles))} |"
         yield "|---" * len(titles) + "|"
         yield f"| {' | '.join(images)} |\n"
     elif result.images_error:
         yield f"No pictures: {cell(result.images_error)}.\n"
+    if PUBLISHED in result.images:
+        yield f"![Masses, limits and gains among those of published robots]({PUBLISHED})\n"
 
 
 def _configs(result: "OnboardResult") -> Iterator[Statement]:

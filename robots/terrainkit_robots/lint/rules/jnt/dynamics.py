@@ -17,11 +17,6 @@ _MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
 """Smallest plausible share of its velocity limit that a leg joint reaches against its damping, and
 the limit above which it is a placeholder [rad/s]."""
 
-# 5 of 536 published files are below it: motors with a control range of 1 and an armature of 1.
-_MIN_ACCELERATION = 20.0
-"""Smallest plausible ratio of effort to armature [rad/s2]. Motors with a high gear ratio reach
-200."""
-
 
 @rule("JNT020", "negative-loss", "error")
 def negative_loss(robot: Facts) -> Violations:
@@ -108,34 +103,6 @@ def excessive_damping(robot: Facts) -> Violations:
                 f"limits it to {speed:.3g} rad/s at its effort limit of {effort:g} N m; expected "
                 f"at least {limit:g} rad/s",
                 measured={"damping": joint.damping, "speed": speed},
-            )
-
-
-@rule("JNT023", "excessive-armature", "warning", needs=("inertia-unit",))
-def excessive_armature(robot: Facts) -> Violations:
-    """The armature of a joint is too large for its effort.
-
-    Armature is the inertia of the rotor times the square of the gear ratio. An excessive one makes
-    the joint too slow to balance with.
-
-    Fix:
-        Compute the armature of the real motor; typical values are 0.005 to 0.2 kg m2.
-
-    Source:
-        Acceleration = effort / armature. Published legged robots have 300 rad/s2 and more.
-    """
-    for joint in robot.actuated_hinges:
-        effort = joint.effort
-        if effort is None or effort <= 0 or joint.armature <= 0:
-            continue
-        acceleration = effort / joint.armature
-        if acceleration < _MIN_ACCELERATION:
-            yield Violation(
-                element=joint,
-                message=f"armature of joint {joint.name}: got {joint.armature:g} kg m2, which "
-                f"limits it to {acceleration:.3g} rad/s2 at its effort limit of {effort:g} N m; "
-                f"expected at least {_MIN_ACCELERATION:g} rad/s2",
-                measured={"armature": joint.armature, "acceleration": acceleration},
             )
 
 

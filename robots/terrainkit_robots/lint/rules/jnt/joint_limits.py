@@ -15,10 +15,6 @@ _MAX_RANGE = 4 * math.pi * 1.001
 _ZERO_TOLERANCE = 1e-3
 """Distance of zero from the limits that is attributed to rounding [rad] or [m]."""
 
-_MIN_RANGE = 0.1
-"""Smallest plausible range of an actuated hinge [rad]. The waists and ankles of humanoids have 0.5
-and more; 2 rad divided by 57.3 are 0.035."""
-
 _MAX_SHIFT = math.pi * 1.05
 """Distance of a whole range from zero above which the range is probably off by a turn [rad]."""
 
@@ -219,44 +215,6 @@ def unlimited_joint(robot: Facts) -> Violations:
                 message=f"range of hinge {joint.name}: got none; expected one, unless the hinge "
                 "turns without end",
             )
-
-
-@rule("JNT018", "narrow-range", "warning", certainty="likely", needs=("angle-unit",))
-def narrow_range(robot: Facts) -> Violations:
-    """The range of a driven hinge is only a few degrees.
-
-    The limits were converted to radians twice, or an MJCF file has limits in radians although its
-    angles are in degrees, which is the default of <compiler>. The joint hardly moves. A joint
-    outside the legs is a note, unless half of all joints are concerned: a rodent's shoulder blade
-    moves by 4 degrees.
-
-    Fix:
-        Give the limits in radians, and set <compiler angle="radian"/> in MJCF.
-
-    Source:
-        The legs of published robots have ranges of 0.3 rad and more.
-    """
-    options = robot.model.options
-    hinges = {joint: joint.range for joint in robot.actuated_hinges if joint.range is not None}
-    narrow = {
-        joint: limits for joint, limits in hinges.items() if limits[1] - limits[0] < _MIN_RANGE
-    }
-    warned = {joint.name for joint in robot.leg_joints}
-    if robot.legs and 2 * len(narrow) >= len(hinges):
-        warned |= {joint.name for joint in narrow}
-    unit = ""
-    if options is not None and options.degrees:
-        unit = "; MJCF angles are in degrees unless <compiler angle> says otherwise"
-    for joint, limits in narrow.items():
-        size = limits[1] - limits[0]
-        yield Violation(
-            element=Part(joint.name, (joint.limit or joint).source),
-            severity=None if joint.name in warned else "note",
-            message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
-            f"{limits[1]:.3g}), which is {math.degrees(size):.3g} after a second conversion; "
-            f"expected at least {_MIN_RANGE:g} rad{unit}",
-            measured={"range": size},
-        )
 
 
 @rule("JNT019", "shifted-range", "warning", certainty="likely", needs=("angle-unit",))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.passive_joints import OPEN_LINKAGE
 from terrainkit_robots.analysis.legs.stance import GRAVITY
-from terrainkit_robots.description.model import Actuator, Joint
+from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 # 46 of 536 published files have placeholders, with 1,000 to 50,000.
@@ -20,20 +20,6 @@ _MAX_VELOCITY = 100.0
 
 _MAX_SPIN_VELOCITY = 1500.0
 """The same for continuous joints [rad/s]; the propellers of small drones reach 1000."""
-
-_MAX_UNIT_COMMAND = 5.0
-"""Largest command of a motor that may be a normalized action instead of a torque."""
-
-_MAX_LEG_EFFORT = 5.0
-"""Plausible effort of a leg joint, over the weight of the robot times its leg length. Published
-legged robots have 0.2 to 1.5."""
-
-_MAX_GEARED_EFFORT = 2.0
-"""The same if a gear multiplies a control range in N m, which is rarely intended."""
-
-_MIN_LEG_VELOCITY = 0.2
-"""Smallest plausible velocity limit of a leg joint [rad/s]. A yaw joint of Romeo has 0.32."""
-
 
 _HOW_TO_CLOSE = (
     "Close the loop with [[loops]] in the file of --spec, or remove the part, which hangs loose. "
@@ -181,81 +167,4 @@ def placeholder_limit(robot: Facts) -> Violations:
                 message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}; "
                 f"expected less than {expected} for a robot of {robot.total_mass:.4g} kg",
                 measured={name: value for name, (value, _, _) in too_large.items()},
-            )
-
-
-@rule(
-    "JNT026",
-    "oversized-effort",
-    "warning",
-    needs=("mass-unit", "length-unit", "effort-unit", "legs"),
-    certainty="likely",
-)
-def oversized_effort(robot: Facts) -> Violations:
-    """The effort limit of a leg joint is far too large for the robot.
-
-    The number is in another unit, such as kg cm, or is a placeholder. A policy learns to jump with
-    torques that the motor does not have.
-
-    Fix:
-        Give the peak torque of the motor after the gear, in N m.
-
-    Source:
-        Effort over weight times leg length: published legged robots have 0.2 to 1.5. In MJCF this
-        is only a note, since benchmark models such as the ant of Gymnasium have 57, unless a gear
-        multiplies a control range that is a torque of the joint already.
-    """
-    weight = robot.total_mass * GRAVITY
-    length = max(leg.length for leg in robot.legs)
-    for joint in robot.leg_joints:
-        effort = joint.effort
-        geared = _geared_torque(robot, joint)
-        share = _MAX_GEARED_EFFORT if geared else _MAX_LEG_EFFORT
-        limit = share * weight * length
-        if effort is None or joint.kind != "revolute" or not effort > limit > 0:
-            continue
-        if effort >= max(1000.0, weight * robot.body_bounds.robot_size):
-            continue  # reported by JNT011
-        yield Violation(
-            element=Part(joint.name, geared.source if geared else (joint.limit or joint).source),
-            severity="note" if robot.model.kind == "mjcf" and not geared else None,
-            message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
-            f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
-            f"most {share:g} times ({limit:.4g} N m)"
-            + (f"; the gear of its motor is {geared.gear:g}" if geared else ""),
-            measured={"effort": effort, "most": limit},
-        )
-
-
-def _geared_torque(robot: Facts, joint: Joint) -> Actuator | None:
-    """Return the motor of a joint if it has a gear although it commands a torque."""
-    for motor in robot.model.actuators:
-        if motor.joint == joint.name and motor.commands is not None and abs(motor.gear) > 1:
-            return motor if max(map(abs, motor.commands)) > _MAX_UNIT_COMMAND else None
-    return None
-
-
-@rule("JNT027", "low-velocity-limit", "warning", needs=("legs",))
-def low_velocity_limit(robot: Facts) -> Violations:
-    """The velocity limit of a leg joint is too low to walk.
-
-    PhysX clips the velocity of the joint to this number. A velocity in turns per second, or that
-    was converted from degrees twice, holds the leg almost still.
-
-    Fix:
-        Give the no-load speed of the motor after the gear [rad/s].
-
-    Source:
-        Published legged robots have 4 rad/s and more.
-    """
-    for joint in robot.leg_joints:
-        velocity = joint.velocity
-        if velocity is None or joint.kind == "prismatic":
-            continue
-        if 0 < velocity < _MIN_LEG_VELOCITY:
-            yield Violation(
-                element=Part(joint.name, (joint.limit or joint).source),
-                message=f"velocity limit of leg joint {joint.name}: got {velocity:g} rad/s; "
-                f"expected at least {_MIN_LEG_VELOCITY:g} rad/s",
-                measured={"velocity": velocity},
             )

@@ -113,7 +113,7 @@ def effort_unit(robot: Facts) -> Violations:
     """The effort limits of all leg joints are off by the same factor.
 
     Efforts in N mm do not limit anything, and efforts in kN m do not hold the robot. Equal efforts
-    of all joints are a placeholder instead, which JNT011 and JNT026 report.
+    of all joints are a placeholder instead, which JNT011 and NRM005 report.
 
     Fix:
         Give the peak torque of each motor after the gear, in N m.

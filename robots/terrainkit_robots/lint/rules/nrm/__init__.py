@@ -1,0 +1,1 @@
+"""Rules on what is unlike published robots (NRM)."""
