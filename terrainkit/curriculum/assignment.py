@@ -91,7 +91,7 @@ def assign_spawns(
 def resample_columns(
     levels: ArrayLike,
     columns: Array,
-    terrain_types: NDArray[np.int32],
+    terrain_types: NDArray[np.integer],
     *,
     seed: Seed,
 ) -> Array:

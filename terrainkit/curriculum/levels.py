@@ -1,9 +1,10 @@
 """The game-inspired curriculum: environments move to harder rows when they succeed."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.curriculum.arrays import Array, Seed, like, make_rng, to_indices, to_progress
+from terrainkit.curriculum.assignment import resample_columns
 from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
 from terrainkit.settings.type_hint import PositiveInt, convert
 
@@ -51,13 +52,21 @@ def update_levels(
 class LevelSampler(PatchSampler):
     """Move an environment up or down the rows of its column, by `update_levels`.
 
-    The columns are distributed evenly and never change. From N. Rudin et al., Learning to Walk in
-    Minutes Using Massively Parallel Deep Reinforcement Learning, 2021 (arXiv:2109.11978).
+    The columns are distributed evenly, and never change unless there are variants. From N. Rudin et
+    al., Learning to Walk in Minutes Using Massively Parallel Deep Reinforcement Learning, 2021
+    (arXiv:2109.11978).
     """
+
+    terrain_types: NDArray[np.integer] | None = None
+    """Terrain of each patch, shape (rows, cols). If it is set, each episode is on a random one of
+    the columns with the same terrain in its row, which are variants; see `resample_columns`."""
 
     def next_patches(
         self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]
     ) -> tuple[IntArray, IntArray]:
         """Return the levels after the rule; see `PatchSampler.next_patches`."""
         rows = len(self.statistics.visits)
-        return update_levels(levels, progress, rows=rows, seed=seed), columns
+        after = update_levels(levels, progress, rows=rows, seed=seed)
+        if self.terrain_types is None:
+            return after, columns
+        return after, resample_columns(after, columns, self.terrain_types, seed=(*seed, 1))

@@ -467,21 +467,31 @@ def _border_boxes(
 
 def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> HeightfieldSurface:
     """Return the surface that MuJoCo collides with."""
+    return surface_with_boxes(terrain_map, collision_boxes(terrain_map, collision))
+
+
+def surface_with_boxes(
+    terrain_map: "TerrainMap", decomposition: BoxDecomposition | None
+) -> HeightfieldSurface:
+    """Return the surface of a map whose ground are these boxes, and a heightfield beside them."""
     heights = np.ascontiguousarray(terrain_map.heights)
     tops = None
-    decomposition = collision_boxes(terrain_map, collision)
     if decomposition is not None:
         tops = np.where(decomposition.box_mask, heights, np.float32(-np.inf))
         heights = without_boxes(heights, decomposition)
     solids = terrain_map.solids
-    collides, visible = solids.select(solids.collides), solids.select(solids.visible)
+    collides, is_visible = solids.collides, solids.visible
+    collision = SolidRaster(solids.select(collides)) if collides.any() else None
+    visible = collision
+    if not np.array_equal(collides, is_visible):
+        visible = SolidRaster(solids.select(is_visible)) if is_visible.any() else None
     return HeightfieldSurface(
         heights=heights,
         first_sample=terrain_map.first_sample,
         cell=terrain_map.grid.cell,
         box_top=tops,
-        collision=SolidRaster(collides) if len(collides) else None,
-        visible=SolidRaster(visible) if len(visible) else None,
+        collision=collision,
+        visible=visible,
     )
 
 

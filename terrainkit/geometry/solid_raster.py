@@ -165,6 +165,53 @@ class SolidRaster:
         return hit, bounds, z.ravel().take(hit)[:, None], np.full(x.shape, fill, np.float32)
 
 
+class PatchRasters(SolidRaster):
+    """The solids of equal patches side by side, each of which can be replaced."""
+
+    def __init__(
+        self, corner: tuple[float, float], size: tuple[float, float], shape: tuple[int, int]
+    ) -> None:
+        """Start without solids.
+
+        Args:
+            corner: Lower corner of patch (0, 0) [m].
+            size: Size of a patch, of which its solids are inside [m].
+            shape: Number of patches along x and y.
+        """
+        self._corner, self._size, self._places = np.array(corner), np.array(size), shape
+        self._shape = np.ceil(self._size * shape / PIXEL).astype(np.int64) + 1
+        self._row = np.zeros(self._shape, np.int32)
+        # Row k of a patch is row k * number of patches + patch here; rows 0 have no solids.
+        self._bounds = np.full((shape[0] * shape[1], 0, 2), np.nan, np.float32)
+
+    def replace(self, patch: int, raster: SolidRaster | None) -> None:
+        """Replace the solids of a patch.
+
+        Args:
+            patch: Number of the patch; the index along y changes fastest.
+            raster: Its solids, at the place of patch (0, 0); None for none.
+        """
+        offset = self._size * np.divmod(patch, self._places[1])
+        first = np.rint(np.array([offset, offset + self._size]) / PIXEL).astype(np.int64)
+        block = self._row[first[0, 0] : first[1, 0], first[0, 1] : first[1, 1]]
+        block[:] = 0
+        if raster is None:
+            return
+        number, table = self._places[0] * self._places[1], raster._bounds
+        more = max(0, len(table) * number - len(self._bounds))
+        layers = max(0, table.shape[1] - self._bounds.shape[1])
+        grown = ((0, more), (0, layers), (0, 0))
+        if more or layers:
+            self._bounds = np.pad(self._bounds, grown, constant_values=np.nan)
+        own = self._bounds[patch::number]
+        own[:] = np.nan
+        own[: len(table), : table.shape[1]] = table
+        i, j = np.rint((raster._corner - self._corner) / PIXEL).astype(np.int64)
+        rows = raster._row
+        rows = np.where(rows > 0, rows * number + patch, 0)
+        block[i : i + len(rows), j : j + rows.shape[1]] = rows
+
+
 def _is_level(solids: Solids) -> NDArray[np.bool_]:
     """Return the boxes and cylinders whose top and bottom are level, as a mask of all solids."""
     shapes = np.concatenate([solids.boxes, solids.cylinders]).astype(float)

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from terrainkit.curriculum import SAMPLERS, CommandProgress, SamplerName
+from terrainkit.curriculum import SAMPLERS, CommandProgress, LevelSampler, SamplerName
 from terrainkit.curriculum.arrays import to_numpy
 from terrainkit.curriculum.progress import FloatArray
 from terrainkit.settings.type_hint import convert
@@ -64,6 +64,9 @@ class TerrainProgress:
 class TerrainLevels:
     """Curriculum term that assigns patches with a sampler of `terrainkit.curriculum`.
 
+    Columns of a map with the same terrain are variants, of which `LevelSampler` takes a random one
+    for each episode.
+
     The term returns the mean level, and by terrain the mean level and the success, and the success
     by level. The success is the share of the episodes that crossed their patch, as a running mean.
     """
@@ -79,7 +82,11 @@ class TerrainLevels:
         self.sampler.levels[:] = _numpy(terrain.terrain_levels)
         self.sampler.columns[:] = _numpy(terrain.terrain_types)
         names = [sub_name.split("#")[0] for sub_name in terrain.cfg.terrain_generator.sub_terrains]
-        self._names = np.array(names if len(names) == cols else ["terrain"] * cols)
+        has_columns = len(names) == cols
+        self._names = np.array(names if has_columns else ["terrain"] * cols)
+        if has_columns and isinstance(self.sampler, LevelSampler):
+            types = np.unique(self._names, return_inverse=True)[1]
+            self.sampler.terrain_types = np.tile(types, (rows, 1))
 
     def __call__(self, env: Any, env_ids: Any, sampler: str | None) -> dict[str, float]:  # noqa: ARG002
         """Assign the patches of the next episodes; return what is logged."""

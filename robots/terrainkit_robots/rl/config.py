@@ -63,6 +63,10 @@ class Terrain(Config):
     """How patches are sampled: levels moves robots that succeed to more difficult rows; uniform
     samples any patch; learning_progress samples patches where success changes; prioritized_replay
     samples patches where success is hard to predict; none keeps the patch of each robot."""
+    stream: bool = False
+    """Whether each robot has a patch of its own, new at each reset: of the sub-terrains, sizes and
+    levels of the map, at any difficulty between two levels. Its episode ends 1 m beyond the patch.
+    Not for hulls and several frictions; `train` alone has it, and `evaluate` takes the map."""
     # 5, and the 17 x 11 points of the height scan below, are legged_gym's.
     max_init_level: Annotated[int, Meta(ge=0)] = 5
     """Highest row to start on; the last row of the map if it has fewer."""

@@ -13,7 +13,7 @@ from terrainkit.views.curriculum_picture import draw_statistics
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.simulation import Ids
-from terrainkit_robots.rl.terminations import terrain_out_of_bounds
+from terrainkit_robots.rl.terminations import left_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.transforms import BoolArray
 
@@ -25,7 +25,7 @@ class TerrainCurriculum:
     """The patches of n robots and the progress of their episodes; see `terrainkit.curriculum`."""
 
     def __init__(self, terrain: Ground, num_envs: int, cfg: Terrain, seed: int) -> None:
-        rows, cols = terrain.env_origins.shape[:2]
+        rows, cols = terrain.terrain_names.shape
         highest = min(cfg.max_init_level, rows - 1)
         sampler = SAMPLERS[cfg.curriculum]
         self.sampler = sampler(rows, cols, num_envs, max_init_level=highest, seed=seed)
@@ -36,7 +36,12 @@ class TerrainCurriculum:
     @property
     def env_origins(self) -> NDArray[np.float32]:
         """Spawn position of each robot [m], shape (n, 3); patches may have several."""
-        return assign_spawns(self._terrain.spawns, self.levels, self.columns)[0][:, :3]
+        return assign_spawns(self._terrain.spawns, *self.places)[0][:, :3]
+
+    @property
+    def places(self) -> tuple[Ids, Ids]:
+        """Indices of each robot's patch into the spawns and goals of the ground, shape (n,)."""
+        return self._terrain.places(self.levels, self.columns)
 
     def log(self) -> dict[str, float]:
         """Return the mean level, and level, success, return and visits of each terrain, to log."""
@@ -97,7 +102,7 @@ def end_episodes(env: "LeggedEnv", env_ids: Ids, unstable: BoolArray) -> dict[st
     log["Episode/speed"] = float((env.path_length[env_ids] / seconds).mean())
     # rsl-rl cuts the first episodes to random lengths, so their progress is not meaningful.
     complete = (env.episode_length_buf.numpy() == env.steps_since_reset)[env_ids]
-    left_map = terrain_out_of_bounds(env) & ~unstable
+    left_map = left_terrain(env) & ~unstable
     progress = env.curriculum.progress.of_episodes(
         env_ids, fallen, env.terrain.patch_length / 2, left_map=left_map[env_ids]
     )

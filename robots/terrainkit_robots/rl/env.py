@@ -27,7 +27,7 @@ from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State, scan_points
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
-from terrainkit_robots.rl.terminations import TERMINATIONS
+from terrainkit_robots.rl.terminations import TERMINATIONS, left_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
@@ -134,6 +134,7 @@ class LeggedEnv(VecEnv):
         )
         velocity = np.where(robot.velocity > 0, robot.velocity, np.inf)
         self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads, velocity)
+        terrain.bind(self.sim.batch)
         self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
         self.curriculum = TerrainCurriculum(terrain, self.num_envs, task.terrain, task.runner.seed)
@@ -295,6 +296,8 @@ class LeggedEnv(VecEnv):
         time_out = self.episode_length_buf.numpy() >= self.max_episode_length
         if self.waypoints and self.velocity_command.fixed is None:
             time_out |= self.waypoints.update(state.base_pos[:, :2])
+        if self.terrain.ends_at_bounds:
+            time_out |= left_terrain(self)
         # A fall at the last step is a termination, which must not be bootstrapped.
         time_out &= ~state.fallen
         done = state.fallen | time_out
@@ -436,10 +439,12 @@ class LeggedEnv(VecEnv):
         self.path_length[env_ids] = self.action_history[:, env_ids] = 0
         for total in self.term_sums.values():
             total[env_ids] = 0
+        levels, columns = self.curriculum.levels, self.curriculum.columns
+        self.terrain.renew(env_ids, levels, columns, self.rng)
         self._call_events("reset", env_ids)
         self.curriculum.progress.reset(env_ids, self.sim.qpos[env_ids], self.yaw[env_ids])
         if self.waypoints:
-            level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
-            self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
+            row, column = (index[env_ids] for index in self.curriculum.places)
+            self.waypoints.reset(env_ids, self.terrain.goals[row, column, :, :2])
         for command in self.active_commands.values():
             command.resample(self.rng, env_ids)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.events import apply_params
+from terrainkit_robots.rl.stream_ground import StreamGround
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv
@@ -25,6 +26,9 @@ def env_arrays(env: "LeggedEnv") -> dict[str, NDArray[Any]]:
         "rewards": env.episode_sums,
         "buffers": env.buffers,
     }
+    if isinstance(env.terrain, StreamGround):
+        names = ("episodes", "types", "difficulties")
+        tables["stream"] = {name: getattr(env.terrain, name) for name in names}
     if env.cfg.domain_rand.action_delay:
         tables["delay"] = {"actions": env.sim.batch.expand("actuator_delay")}
     # The state has means, accelerations and forces, which cannot be computed from the physics.
@@ -64,6 +68,8 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
     if num_envs != env.num_envs and num_envs == len(saved["sim.episode_length"]):
         check_state("env.arrays", saved, {name: own["arrays"][name] for name in _SHARED})
         _copy_arrays(env, saved, _SHARED)
+        if isinstance(env.terrain, StreamGround):  # no patch comes twice
+            env.terrain.skip(int(saved["stream.episodes"].max()))
         env.reset()
         return
     try:
@@ -75,6 +81,8 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
         if name.startswith("buffers.") and name not in own["arrays"]:
             env.buffers[name.removeprefix("buffers.")] = torch.clone(array).numpy()
     _copy_arrays(env, saved, own["arrays"])
+    if isinstance(env.terrain, StreamGround):
+        env.terrain.restore()
     if env.waypoints and (env.waypoints.index > env.waypoints.numbers).any():
         largest = env.waypoints.index.max()
         raise ConfigError(f"next goal: got {largest}; expected no more than the robot has")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.integrations.near_geoms import NearGeoms, collides
+from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
@@ -68,9 +68,9 @@ class Scene:
             self.near_geoms = None  # of the terrain, if the model has not all of them
             if not terrain.is_plane and not all_geoms:
                 move = MAX_SPEED * task.dt
-                near = NearGeoms(mjspec, base=robot.spec.base, max_move=move)
-                if near.is_active:
-                    self.near_geoms, self.model = near, mjspec.compile()
+                self.near_geoms = terrain.near_geoms(mjspec, robot.spec.base, move)
+                if self.near_geoms:
+                    self.model = mjspec.compile()
         model = self.model
         joints = [model.joint(name).id for name in robot.spec.joint_order]
         self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order

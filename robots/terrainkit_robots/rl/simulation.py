@@ -12,9 +12,8 @@ from terrainkit.files.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
+from terrainkit_robots.rl.terrain import Ids as Ids
 from terrainkit_robots.spec.robot_arrays import Robot
-
-Ids = NDArray[np.int64]
 
 SPEED_AT_EFFORT = 0.9
 """Share of a joint's speed limit up to which its motor has the whole effort. From there, the torque

@@ -29,11 +29,16 @@ def bad_orientation(env: "LeggedEnv") -> BoolArray:
     return -env.state.projected_gravity[:, 2] < np.cos(env.cfg.termination.tilt)
 
 
-def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
-    """Return which robots have left the map."""
+def left_terrain(env: "LeggedEnv") -> BoolArray:
+    """Return which robots have left the map, or their patch of a stream."""
     xy = env.state.base_pos[:, :2]
     terrain = env.terrain
     return np.asarray(((xy < terrain.lower) | (xy > terrain.upper)).any(axis=1))
+
+
+def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
+    """Return which robots have left the map; to leave a patch of a stream is no fall."""
+    return left_terrain(env) & ~np.bool_(env.terrain.ends_at_bounds)
 
 
 def stuck(env: "LeggedEnv") -> BoolArray:

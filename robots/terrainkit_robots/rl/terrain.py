@@ -13,8 +13,11 @@ from terrainkit.errors import ConfigError
 from terrainkit.export.mjcf_map import collision_surface
 from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.integrations.mujoco import make_spec
+from terrainkit.integrations.near_geoms import NearGeoms
 from terrainkit.settings.text import closest
 from terrainkit_robots.transforms import FloatArray
+
+Ids = NDArray[np.int64]
 
 
 class Ground(ABC):
@@ -26,14 +29,39 @@ class Ground(ABC):
     goals: FloatArray = np.full((1, 1, 1, 4), np.nan, np.float32)  # as the spawns
     terrain_names: NDArray[np.str_]  # name of each patch's terrain
     patch_length: float = 8.0  # distance to walk to cross a patch [m]
-    lower: tuple[float, float]  # lower corner, x and y [m]
-    upper: tuple[float, float]  # upper corner, x and y [m]
+    # Corners of the ground, x and y, or of that of each robot, shape (n, 2) [m].
+    lower: tuple[float, float] | NDArray[np.float64]
+    upper: tuple[float, float] | NDArray[np.float64]
+    ends_at_bounds: bool = False  # whether an episode that leaves it ends as at its time limit
     surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
     is_plane: bool  # an infinite plane, without patches: a height scan carries no information
 
     @abstractmethod
     def spec(self) -> Any:
         """Return the ground as an `mujoco.MjSpec`."""
+
+    def near_geoms(self, mjspec: Any, base: str, max_move: float) -> NearGeoms | None:
+        """Replace the geoms of a scene by those near a robot; None if that is not faster.
+
+        Args:
+            mjspec: Robot and ground, which is changed.
+            base: Body of the robot's base.
+            max_move: Distance that the base moves at most in a step [m].
+        """
+        near = NearGeoms(mjspec, base=base, max_move=max_move)
+        return near if near.is_active else None
+
+    def bind(self, batch: Any) -> None:  # noqa: B027
+        """Let the simulations of a batch collide with this ground."""
+
+    def renew(  # noqa: B027
+        self, env_ids: Ids, levels: Ids, columns: Ids, rng: np.random.Generator
+    ) -> None:
+        """Change the ground of robots whose episodes start, shape (k,); see `StreamGround`."""
+
+    def places(self, levels: Ids, columns: Ids) -> tuple[Ids, Ids]:
+        """Return the indices into `spawns` and `goals` of robots on these patches, shape (n,)."""
+        return levels, columns
 
     def height(
         self, x: FloatArray, y: FloatArray, z: FloatArray | float = np.inf, *, scan: bool = False
@@ -54,7 +82,7 @@ class Plane(Ground):
     def spec(self) -> Any:
         """Return a plane with a checkered surface."""
         mjspec = mujoco.MjSpec()
-        _add_material(mjspec)
+        add_material(mjspec)
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         mjspec.worldbody.add_geom(name="ground", type=plane, size=[0, 0, 0.1], material="ground")
         return mjspec
@@ -79,13 +107,13 @@ class MapGround(Ground):
         mjspec = make_spec(self.terrain_map, collision=self._collision)
         for goal in mjspec.sites:  # every step would compute their positions
             mjspec.delete(goal)
-        _add_material(mjspec)
+        add_material(mjspec)
         for geom in mjspec.geoms:
             geom.material, geom.rgba = "ground", [1, 1, 1, 1]
         return mjspec
 
 
-def _add_material(mjspec: Any) -> None:
+def add_material(mjspec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
     texture = mjspec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER

@@ -68,6 +68,7 @@ def train(
 
     from terrainkit_robots.rl.env import make_env
     from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
+    from terrainkit_robots.rl.stream_ground import training_ground
 
     process_task = process_share(task)
     if process_task.env.num_envs * process_task.runner.num_steps_per_env < 2:
@@ -79,7 +80,7 @@ def train(
     loaded_robot = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(process_task.env.num_threads)
     torch.manual_seed(process_task.runner.seed)
-    env = make_env(process_task, loaded_robot, ground, device)
+    env = make_env(process_task, loaded_robot, training_ground(ground, process_task), device)
     runner = LeggedRunner(
         env, device=device, progress_callback=progress_callback, should_stop=should_stop
     )

@@ -77,11 +77,34 @@ def test_robots_that_follow_their_commands_move_up():
     env.termination_manager.terminated[1] = True
     log = env.reset(torch.tensor([0, 1, 2]))
     assert env.terrain.terrain_levels.tolist() == [1, 0, 0, 2]
-    expected = env.terrain.terrain_origins[[1, 0, 0], [0, 0, 1]]
+    expected = env.terrain.terrain_origins[[1, 0, 0], env.terrain.terrain_types[:3]]
     assert torch.equal(env.terrain.env_origins[:3], expected)
+    assert env.terrain.terrain_types[3] == 1
     # One of two episodes on level 0 crossed its patch: 0 and 1 of the same column.
     success = {"success/stairs": 0.25, "success/level_0": 0.5, "success/level_1": 0.0}
     assert log == {"mean": 0.75, "stairs": 0.75} | {k: pytest.approx(v) for k, v in success.items()}
+
+
+@pytest.mark.parametrize(
+    ("sampler", "names", "rotates"),
+    [
+        ("levels", ("stairs", "stairs#2"), True),
+        ("levels", ("stairs", "rough"), False),
+        (None, ("stairs", "stairs#2"), False),
+    ],
+)
+def test_variants_of_a_terrain_take_turns(sampler, names, rotates):
+    env = Env(sampler)
+    env.terrain.cfg.terrain_generator.sub_terrains = dict.fromkeys(names)
+    env.curriculum = TerrainLevels(SimpleNamespace(params=env.params), env)
+    env.reset()
+    columns = set()
+    for _ in range(20):
+        env.step([0.0] * 4)
+        env.reset()
+        columns.add(tuple(env.terrain.terrain_types.tolist()))
+    assert (len(columns) > 8) == rotates  # of 16
+    assert rotates or columns == {(0, 0, 1, 1)}
 
 
 @pytest.mark.parametrize(("y", "levels"), [(-7.9, [0, 1]), (-8.1, [0, 2])])
