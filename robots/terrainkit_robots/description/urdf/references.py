@@ -111,6 +111,8 @@ def _references(root: "etree._Element") -> Iterator[Reference]:
             for joint in element.iterchildren("joint"):
                 place = f"joint of a <{element.tag}>"
                 yield Reference(joint, place, "joint", joint.get("name", ""))
+                for param in joint.iterfind("param[@name='mimic']"):
+                    yield Reference(param, place, "joint", (param.text or "").strip())
 
 
 def _driven_joint(transmission: "etree._Element") -> str:
