@@ -17,7 +17,8 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     loaded_robots,
 )
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.text import conjunction
+from terrainkit_robots.lint.rules.jnt.joint_limits import joints_without_zero
+from terrainkit_robots.text import conjunction, names
 
 _MAX_JOINTS = 40
 """Maximum number of joints for which the message contains the permutation."""
@@ -38,6 +39,8 @@ def simulator_defaults(robot: Facts) -> Violations:
     - **Armature.** Genesis sets the armature of a joint without one to 0.1 kg m2, ten times the
       armature of a small legged robot. A joint that moves less inertia accelerates much more
       slowly than in other simulators.
+    - **Start.** All joints start at 0, which the knees of most legs exclude: set the default
+      positions. JNT012 reports robots without legs.
 
     Fix:
         Address joints by name, or reorder by the printed list: `there = [here[i] for i in order]`,
@@ -53,6 +56,9 @@ def simulator_defaults(robot: Facts) -> Violations:
         marked as unverified. Inertias are those of all links below a joint, all joints at 0.
     """
     parts = [*_order(robot), *_feet(robot), *_trunk(robot), *_armature(robot)]
+    if robot.legs and (joints := joints_without_zero(robot)):
+        listed = names((joint.name for joint in joints), 4)
+        parts.append(f"joints start at 0, which is outside of the limits of {listed}")
     if parts:
         file = robot.file_order
         others = [order for order in robot.simulator_orders if order.joints != file]
