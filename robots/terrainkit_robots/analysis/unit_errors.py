@@ -6,7 +6,7 @@ published descriptions of robots and hands.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,9 @@ class Quantity:
     units: Mapping[float, str]
     """Units by the factor between a value in it and the same value in the SI unit."""
 
+    tolerance: float = _UNIT_TOLERANCE
+    """Factor between an estimate and its unit, at most. A robot may be scaled as a whole."""
+
     def factor(self, values: Sequence[float]) -> float | None:
         """Return the factor between the values and plausible ones; None if they are plausible."""
         if len(values) < _MIN_COUNT:
@@ -53,7 +56,7 @@ class Quantity:
     def unit(self, factor: float) -> tuple[float, str]:
         """Return factor and name of the likely unit; the name is empty if none is known."""
         nearest = min(self.units, key=lambda unit: abs(np.log(factor / unit)))
-        is_known = 1 / _UNIT_TOLERANCE <= factor / nearest <= _UNIT_TOLERANCE
+        is_known = 1 / self.tolerance <= factor / nearest <= self.tolerance
         return (nearest, self.units[nearest]) if is_known else (factor, "")
 
 
@@ -78,6 +81,9 @@ SIZE = Quantity(
     units={1e3: "millimeters", 1e2: "centimeters", 39.37: "inches", 1e-3: "kilometers"},
 )
 """Length [m]."""
+
+SHAPE_SIZE = replace(SIZE, tolerance=_UNIT_TOLERANCE ** (1 / 3))
+"""A length that is estimated from a density, which has the third power of its error."""
 
 # Medians: 0.85 to 8 rad.
 RANGE = Quantity(
@@ -174,7 +180,7 @@ def body_unit_errors(robot: Facts) -> Iterator[tuple[str, UnitError]]:
     if mass is not None and (is_joints or is_shapes or not 1e-4 < mass < 1e4):
         # A volume is the third power of a length.
         name, factor = "shapes" if is_shapes else "lengths", mass ** (-1 / 3)
-        yield name, UnitError(SIZE, factor, densities, DENSITY.limits)
+        yield name, UnitError(SHAPE_SIZE, factor, densities, DENSITY.limits)
     elif is_joints and half < _MIN_PART * size:
         offsets = [float(np.linalg.norm(body.origin[:3, 3])) for body in robot.bodies[1:]]
         yield "joint origins", UnitError(SIZE, size / SIZE.typical, offsets, SIZE.limits)

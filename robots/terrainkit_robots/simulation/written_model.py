@@ -95,13 +95,13 @@ class WrittenStand:
 
 
 @cached_fact
-def make_written_model(facts: Facts) -> WrittenModel:
-    """Return the robot of an MJCF file, compiled as it is written, on a floor.
+def compile_file(facts: Facts) -> tuple[Any, Any]:
+    """Return the `mujoco.MjSpec` of an MJCF file and its model, as it is written, on a floor.
 
     Shapes that are only drawn are removed, and so are sensors.
 
     Raises:
-        CannotCheckError: if MuJoCo cannot simulate it.
+        CannotCheckError: if MuJoCo does not load it.
     """
     import mujoco
 
@@ -113,9 +113,21 @@ def make_written_model(facts: Facts) -> WrittenModel:
             spec = mujoco.MjSpec.from_file(str(facts.model.file))
             remove_drawings(spec)
             _add_floor(spec)
-            model = spec.compile()
+            return spec, spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError):
         raise CannotCheckError("MuJoCo does not load the file (SIM004)") from None
+
+
+@cached_fact
+def make_written_model(facts: Facts) -> WrittenModel:
+    """Return the robot of an MJCF file, compiled as it is written, on a floor.
+
+    Raises:
+        CannotCheckError: if MuJoCo cannot simulate it.
+    """
+    import mujoco
+
+    _, model = compile_file(facts)
     (free,) = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if free.tolist() != [0]:
         raise CannotCheckError(f"free joints: got {len(free)}; expected one, the joint of the base")
@@ -129,6 +141,8 @@ def make_written_model(facts: Facts) -> WrittenModel:
     shapes = collides(model)
     shapes[model.pair_geom1] = shapes[model.pair_geom2] = True
     is_floor = model.geom_bodyid == 0
+    if (model.geom_type[shapes & is_floor] != mujoco.mjtGeom.mjGEOM_PLANE).any():
+        raise CannotCheckError("the ground of its scene is not flat")
     if not (shapes & ~is_floor).any():
         raise CannotCheckError("the robot has no collision shapes and falls through the floor")
     return WrittenModel(
@@ -175,8 +189,6 @@ def _add_floor(spec: Any) -> None:
 
     paired = _paired(spec)
     ground = [g for g in spec.worldbody.geoms if g.contype or g.conaffinity or g.name in paired]
-    if any(geom.type != mujoco.mjtGeom.mjGEOM_PLANE for geom in ground):
-        raise CannotCheckError("the ground of its scene is not flat")
     if not ground:
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -269,9 +281,9 @@ def position_servos(model: Any) -> list[int]:
 
     is_servo = (model.actuator_biasprm[:, 1] < 0) & (model.actuator_gainprm[:, 0] != 0)
     on_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-    kinds = model.jnt_type[model.actuator_trnid[:, 0]]
-    moves = (kinds == mujoco.mjtJoint.mjJNT_SLIDE) | (kinds == mujoco.mjtJoint.mjJNT_HINGE)
-    return [int(index) for index in np.flatnonzero(is_servo & on_joint & moves)]
+    moving = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
+    servos = np.flatnonzero(is_servo & on_joint).tolist()
+    return [index for index in servos if model.jnt_type[model.actuator_trnid[index, 0]] in moving]
 
 
 def _clearance(written: WrittenModel, model: Any, data: Any) -> float:

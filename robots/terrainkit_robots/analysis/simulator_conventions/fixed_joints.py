@@ -8,7 +8,6 @@ merged link, such as a foot, does not exist.
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Literal, get_args
 
 from terrainkit_robots.analysis.bodies.bodies import Body
@@ -18,17 +17,6 @@ from terrainkit_robots.description.model import Joint, Kind
 Simulator = Literal["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
 
 SIMULATORS: tuple[Simulator, ...] = get_args(Simulator)
-
-KEEP_LINK_OPTIONS: Mapping[Simulator, str] = MappingProxyType(
-    {
-        "MuJoCo": '<mujoco><compiler fusestatic="false"/></mujoco> in the URDF',
-        "Isaac Gym": 'dont_collapse="true" on the joint, or collapse_fixed_joints = False',
-        "Isaac Lab": 'dont_collapse="true" on the joint, or merge_fixed_joints=False',
-        "Genesis": "links_to_keep=[...] of gs.morphs.URDF, or merge_fixed_links=False",
-    }
-)
-"""How to keep a link on a fixed joint as a separate body. MuJoCo, Isaac Lab and Genesis merge by
-default; Isaac Gym merges as configured by legged_gym and its forks; PyBullet does not merge."""
 
 _READS_DONT_COLLAPSE = frozenset({"Isaac Gym", "Isaac Lab"})
 
@@ -91,6 +79,9 @@ def merged_joints(
     fixed: Iterable[Joint], simulator: Simulator, *, keeps_fixed_links: bool = False
 ) -> frozenset[Joint]:
     """Return the fixed joints that a simulator merges by default.
+
+    MuJoCo, Isaac Lab and Genesis merge; Isaac Gym merges as configured by legged_gym and its forks;
+    PyBullet does not merge.
 
     Args:
         fixed: The fixed joints of a robot.

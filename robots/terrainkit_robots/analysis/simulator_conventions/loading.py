@@ -165,11 +165,12 @@ def _without_meshes(model: RobotModel) -> tuple[str, Mapping[str, bytes]]:
     from lxml import etree
 
     root = _without_names(model)
-    files: dict[tuple[str, str], str] = {}
+    files: dict[str, str] = {}
     for mesh in root.iter("mesh"):
         if "filename" in mesh.attrib:
-            key = mesh.get("filename", ""), mesh.get("scale", "")
-            mesh.set("filename", files.setdefault(key, f"{len(files)}.obj"))
+            mesh.attrib.pop("scale", "")  # which may be too small for MuJoCo
+            name = files.setdefault(mesh.get("filename", ""), f"{len(files)}.obj")
+            mesh.set("filename", name)
     for compiler in root.iter("compiler"):
         for name in _FOLDER_ATTRIBUTES & set(map(str, compiler.keys())):
             del compiler.attrib[name]

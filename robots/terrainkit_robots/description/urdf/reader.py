@@ -59,6 +59,9 @@ from terrainkit_robots.description.xml.number_text import place_text
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers, replace_commas
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
+_VERSIONS = ("1.0", "1.1", "1.2")
+"""Versions of the format that urdfdom 6 reads. Releases before 5.1 read the first only."""
+
 _Numbers = TypeVar("_Numbers", Limit, Dynamics, SafetyController)
 
 
@@ -92,6 +95,7 @@ class _Reader:
             self._report(
                 "XML003", root, "the robot has no name; expected <robot name=...>", fix=fix
             )
+        self._check_version(root)
         self._check_names(root)
         self._colors = named_colors(root)
         self._controlled = {
@@ -141,6 +145,22 @@ class _Reader:
 
     def _removal(self, element: "etree._Element", description: str) -> Fix | None:
         return make_fix("safe", description, [RemoveElement(source=self._doc.source(element))])
+
+    def _check_version(self, root: "etree._Element") -> None:
+        """Report a version that urdfdom rejects."""
+        version = root.get("version", _VERSIONS[0])
+        if version not in _VERSIONS and not has_variable(version):
+            self._problems.append(
+                Problem(
+                    code="XML006",
+                    message=f"version of <robot>: got {truncate(version)!r}; expected "
+                    f"{_VERSIONS[0]}, the version of the format, since urdfdom and ROS reject "
+                    "the file",
+                    source=self._doc.source(root),
+                    attribute="version",
+                    severity="warning",
+                )
+            )
 
     def _check_names(self, root: "etree._Element") -> None:
         """Report unexpanded xacro and misspelled names."""

@@ -78,10 +78,11 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
             continue
         near = ""
         if len(found) < MAX_SUGGESTIONS and len(known[kind]) <= MAX_COMPARED:
-            # A joint that another transmission drives is not the one that was meant.
-            near = closest(name, known[kind] - used[place])
-            # Another number is another element, not a misspelling.
-            near = "" if _NUMBERS.sub("", near) == _NUMBERS.sub("", name) else near
+            near = closest(name, known[kind])
+            # A joint that another transmission drives is not the one that was meant, and another
+            # number is another element, not a misspelling.
+            is_other = near in used[place] or _NUMBERS.sub("", near) == _NUMBERS.sub("", name)
+            near = "" if is_other else near
         suggestion = f" (did you mean {near}?)" if near else ""
         found[name] = Problem(
             code="TRE010",
@@ -110,6 +111,8 @@ def _references(root: "etree._Element") -> Iterator[Reference]:
             for joint in element.iterchildren("joint"):
                 place = f"joint of a <{element.tag}>"
                 yield Reference(joint, place, "joint", joint.get("name", ""))
+                for param in joint.iterfind("param[@name='mimic']"):
+                    yield Reference(param, place, "joint", (param.text or "").strip())
 
 
 def _driven_joint(transmission: "etree._Element") -> str:

@@ -51,7 +51,13 @@ _CHILDREN: Mapping[str, frozenset[str]] = {
 _OTHER_FORMATS: Mapping[str, tuple[str, str]] = {
     "pose": ("SDF", "<origin>"),
     "model": ("SDF", "<link> and <joint>"),
-    **dict.fromkeys(("self_collide", "static", "kinematic"), ("SDF", "<gazebo>")),
+    **dict.fromkeys(
+        (
+            *("self_collide", "selfCollide", "static", "kinematic", "gravity", "surface"),
+            *("mu1", "mu2", "kp", "kd", "turnGravityOff", "provideFeedback"),
+        ),
+        ("SDF", "<gazebo>"),
+    ),
     **dict.fromkeys(("body", "worldbody"), ("MJCF", "<link> and <joint>")),
     "geom": ("MJCF", "<visual> and <collision>"),
     "freejoint": ("MJCF", '<joint type="floating">'),
@@ -60,6 +66,21 @@ _OTHER_FORMATS: Mapping[str, tuple[str, str]] = {
     ),
 }
 """Elements of other formats in the elements of `_CHILDREN`: the format, and where URDF has it."""
+
+_PLACES: Mapping[str, str] = {
+    **{
+        name: f"<{tag} {name}=...>"
+        for tag in ("origin", "inertia", "limit", "mimic", "dynamics", "safety_controller")
+        for name in _ATTRIBUTES[tag] - {"joint", "offset"}
+    },
+    **dict.fromkeys(("pos",), "<origin xyz=...>"),
+    **dict.fromkeys(("quat", "euler"), "<origin rpy=...>"),
+    **dict.fromkeys(("diaginertia", "fullinertia"), "<inertia ixx=...>"),
+    "mass": "<mass value=...>",
+    "range": "<limit lower=... upper=...>",
+    "frictionloss": "<dynamics friction=...>",
+}
+"""Where URDF has an attribute that is in another element, or of MJCF."""
 
 _TOP_LEVEL = ("ros2_control", "transmission", "gazebo", "mujoco", "link", "joint")
 """Elements that are read as children of <robot> only."""
@@ -122,15 +143,22 @@ def unread_elements(root: "etree._Element") -> Iterator[tuple["etree._Element", 
     while stack:
         parent, is_urdf = stack.pop()  # a <gazebo> contains SDF
         known = _CHILDREN.get(str(parent.tag), frozenset()) if is_urdf else frozenset()
+        attributes = _ATTRIBUTES.get(str(parent.tag), known and frozenset({"name"}))
+        for name in sorted(_PLACES.keys() & set(parent.keys()) - attributes) if attributes else ():
+            if is_urdf and _has_effect(parent.get(name, "")):
+                where = f"attribute {name} of <{parent.tag}> is not read"
+                yield parent, f"{where}; expected {_PLACES[name]}"
         for child in parent.iterchildren(etree.Element):
             origin, use = _OTHER_FORMATS.get(child.tag, ("", ""))
             if child.tag in _TOP_LEVEL and parent is not root and _is_urdf(child):
                 where = f"inside <{parent.tag}>; expected a child of <robot>"
                 yield child, f"<{child.tag}> is not read {where}"
-            elif origin and known and child.tag not in known and _has_effect(child):
+            elif origin and known and child.tag not in known and _has_effect_of(child):
                 lacks = "" if "origin" not in known or parent.find("origin") is not None else use
                 lacks = lacks and f", and the <{parent.tag}> has no {lacks}"
                 yield child, f"<{child.tag}> of {origin} is not read{lacks}; expected {use}"
+            elif is_urdf and (use := _meant_element(parent, child)):
+                yield child, f"<{child.tag}> in <{parent.tag}> is not read; expected {use}"
             elif child.tag not in _FOREIGN_CONTENT and ":" not in child.tag:
                 stack.append((child, is_urdf and child.tag != "gazebo"))
 
@@ -141,11 +169,31 @@ def _is_urdf(element: "etree._Element") -> bool:
     return not is_part or any(element.find(path) is not None for path in _URDF_CONTENT)
 
 
-def _has_effect(element: "etree._Element") -> bool:
+def _meant_element(parent: "etree._Element", child: "etree._Element") -> str:
+    """Return what an unknown child of an element was meant to be, or an empty text."""
+    known = _CHILDREN.get(parent.tag, frozenset())
+    if child.tag in known or closest(child.tag, known, _MIN_TAG_SIMILARITY):
+        return ""
+    if child.tag in _ATTRIBUTES.get(parent.tag, ()):  # SDF has elements in place of attributes
+        return f"<{parent.tag} {child.tag}=...>"
+    places = [tag for tag, tags in _CHILDREN.items() if child.tag in tags and tag != "robot"]
+    if known and places:
+        return f"a child of <{places[0]}>"
+    names = set(child.keys())
+    tags = {_PLACES.get(name, "") for name in names}
+    same = [tag for tag in known if names and names <= _ATTRIBUTES.get(tag, frozenset())]
+    return f"<{same[0]}>" if same and "" not in tags else ""
+
+
+def _has_effect(text: str) -> bool:
+    """Return whether a value is not a list of zeros."""
+    return bool(set(text) - set("0. -+"))
+
+
+def _has_effect_of(element: "etree._Element") -> bool:
     """Return whether an element is not a pose of zeros."""
     texts = (element.text or "", *element.values())
-    numbers = [number for text in texts if (number := text.strip())]
-    return element.tag != "pose" or any(set(text) - set("0. -+") for text in numbers)
+    return element.tag != "pose" or any(_has_effect(text.strip()) for text in texts)
 
 
 def _is_described(element: "etree._Element") -> bool:

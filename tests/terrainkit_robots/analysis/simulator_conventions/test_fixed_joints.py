@@ -1,8 +1,6 @@
 import pytest
 
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
-    KEEP_LINK_OPTIONS,
-    SIMULATORS,
     kept_bodies,
     merge_joints,
     merged_joints,
@@ -36,10 +34,6 @@ def test_bodies_of_mjcf_are_kept():
     robot = mjcf(f'<body name="b"><freejoint/>{geom}<body name="f">{geom}</body></body>')
     assert robot.fixed_joints == ()
     assert merged_tree(robot, "Genesis").body_of == {"b": "b", "f": "f"}
-
-
-def test_keep_link_options_cover_every_simulator_that_merges():
-    assert [*KEEP_LINK_OPTIONS, "PyBullet"] == list(SIMULATORS)
 
 
 def test_kept_bodies_are_the_parts_below_dont_collapse():

@@ -57,7 +57,7 @@ def report(model, finding):
             finding(),
             finding("JNT007", "degrees", "warning", line=40, certainty="likely", fix=fix),
             finding("JNT007", "degrees", "warning", line=0, subject=""),
-            finding("LEG001", "legs", "note", line=1, measured={"legs": 4}),
+            finding("LEG004", "legs", "note", line=1, measured={"legs": 4}),
         ),
         skipped=(
             Skipped(code="SYM001", kind="no-legs", reason="no legs detected"),

@@ -7,7 +7,7 @@ def test_each_finding_is_a_command(report):
         f"::error file=robot.urdf,line=12,title=INR002 negative-mass::{said}",
         f"::warning file=robot.urdf,line=40,title=JNT007 degrees::{said}",
         f"::warning file=robot.urdf,title=JNT007 degrees::{said}",
-        f"::notice file=robot.urdf,line=1,title=LEG001 legs::{said}",
+        f"::notice file=robot.urdf,line=1,title=LEG004 legs::{said}",
     ]
     assert to_text([]) == ""
 

@@ -19,7 +19,7 @@ TEXT = f"""\
 | error | INR002 negative-mass | robot.urdf:12 | {MASS} | Weigh it. |
 | warning | JNT007 degrees | robot.urdf:40 | {MASS} (likely) | Weigh it. |
 | warning | JNT007 degrees | robot.urdf | {MASS} | Weigh it. |
-| note | LEG001 legs | robot.urdf:1 | {MASS} | Weigh it. |
+| note | LEG004 legs | robot.urdf:1 | {MASS} | Weigh it. |
 
 Likely: the finding depends on a heuristic, such as leg detection.
 

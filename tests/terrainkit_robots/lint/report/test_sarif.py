@@ -48,7 +48,7 @@ def test_results_of_a_report(report):
         result("INR002", "error", 12),
         result("JNT007", "warning", 40, certainty="likely", fix=fix),
         result("JNT007", "warning", 0, subject=""),
-        result("LEG001", "note", 1, measured={"legs": 4}),
+        result("LEG004", "note", 1, measured={"legs": 4}),
         result("INR002", "error", 30, subject="hatch", suppressions=suppressions),
     ]
 

@@ -17,9 +17,9 @@ def text_of(report):
 
 
 def test_text_of_a_report(report):
-    note = "note LEG001 the mass is -1 kg; expected > 0"
+    note = "note LEG004 the mass is -1 kg; expected > 0"
     assert to_text([report]) == TEXT.format(note=note, how="notes in full: --notes\n")
-    note = "note LEG001 legs\n  line 1: the mass is -1 kg; expected > 0"
+    note = "note LEG004 legs\n  line 1: the mass is -1 kg; expected > 0"
     assert to_text([report], verbose=True) == TEXT.format(note=note, how="")
 
 
@@ -55,9 +55,9 @@ def test_several_files_have_total_counts(report):
 
 def test_notes_are_one_line_by_default(text_of, finding):
     message = "position of " + ", ".join(f"joint_{k}" for k in range(40))
-    text = text_of(finding(), finding("LEG001", "legs", "note", message=message))
+    text = text_of(finding(), finding("LEG004", "legs", "note", message=message))
     (line,) = [each for each in text.splitlines() if each.startswith("note ")]
-    assert line.startswith("note LEG001 position of joint_0, joint_1")
+    assert line.startswith("note LEG004 position of joint_0, joint_1")
     assert line.endswith("...")
     assert len(line) <= 100
 

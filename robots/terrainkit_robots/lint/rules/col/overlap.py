@@ -11,7 +11,14 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
-from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rule import (
+    Part,
+    Severity,
+    Violation,
+    Violations,
+    findings_of,
+    rule,
+)
 from terrainkit_robots.text import contrast
 
 if TYPE_CHECKING:
@@ -66,8 +73,11 @@ def overlap(robot: Facts) -> Violations:
     if not robot.bodies:
         raise CannotCheckError("there is no tree of links")
     overlaps = robot.overlap_scene.detect(robot.default_pose)
+    wrong = {finding.subject for finding in findings_of(robot, "COL009")}
     for pair, deepest in _group_by_pair(robot, overlaps).items():
-        if deepest.depth <= _MAX_OVERLAP:
+        # A shape that is too large or displaced causes all its overlaps.
+        is_reported = not wrong.isdisjoint((deepest.first.link, deepest.second.link))
+        if deepest.depth <= _MAX_OVERLAP or is_reported:
             continue
         got, expected = contrast(1000 * deepest.depth, 1000 * _MAX_OVERLAP, ".1f")
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
@@ -115,7 +125,8 @@ def overlap_in_range(robot: Facts) -> Violations:
     """Two bodies overlap in a large part of the joint range.
 
     Exploration reaches every part of the range. If two bodies overlap in most of it, the joint
-    range or a collision shape is larger than on the real robot.
+    range or a collision shape is larger than on the real robot. Bodies that overlap at the default
+    pose are left to COL005.
 
     Fix:
         Compare the joint limits and the collision shapes with the real robot.
@@ -138,9 +149,10 @@ def overlap_in_range(robot: Facts) -> Violations:
     for overlaps in robot.overlap_scene.sweep(positions, _NUM_SAMPLES):
         deepest = _group_by_pair(robot, overlaps)
         counts.update(pair for pair, overlap in deepest.items() if overlap.depth > _MAX_OVERLAP)
+    wrong = {finding.subject for finding in findings_of(robot, "COL005", "COL009")}
     for pair, number in counts.items():
         share = number / _NUM_SAMPLES
-        if share > _MAX_OVERLAP_SHARE:
+        if share > _MAX_OVERLAP_SHARE and wrong.isdisjoint((" and ".join(pair), *pair)):
             got, expected = contrast(share, _MAX_OVERLAP_SHARE, ".0%")
             yield Violation(
                 element=Part(" and ".join(pair), robot.tree.links[pair[0]].source),

@@ -25,6 +25,9 @@ _MAX_ANGLE = math.radians(3)
 _MAX_SIZE_RATIO = 1.5
 """Allowed ratio of the sizes of a primitive as collision and as visual shape."""
 
+_MAX_ERROR_RATIO = 9.0
+"""The same for an error: from a decimal place on, a part collides with everything around it."""
+
 _MIN_SHARE_INSIDE = 0.5
 """Share of a collision shape's bounding box that has to be inside of the visible robot around
 it."""
@@ -51,7 +54,7 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
     it cannot be seen, for example with its own thighs. A collision primitive that is larger than
     the visual primitive at the same place is reported as well, such as a sphere whose radius is
     the diameter, and a cylinder that is turned against the visible one, or against the axis of the
-    wheel that it belongs to.
+    wheel that it belongs to. From 9 times on it is an error.
 
     Fix:
         Copy <origin> and scale from the correct element to the other one.
@@ -150,6 +153,7 @@ def _resized_primitives(robot: Facts) -> Violations:
         if counts[ratio] == 1:
             yield Violation(
                 element=Part(name, collision.size_source or collision.source),
+                severity="error" if ratio > _MAX_ERROR_RATIO else None,
                 certainty="likely",
                 message=f"size of the collision {collision.shape} of link {name}: got "
                 f"{numbers(collision.size)} m, {ratio:g} times the "

@@ -128,7 +128,8 @@ def does_not_stand(robot: Facts) -> Violations:
     yield Violation(
         severity=_LEVELS[level],
         message=f"standing pose {control}: {'; '.join(assessment.failures)}"
-        + ("; without self-collision the robot stands" if stands_without else ""),
+        + ("; without self-collision the robot stands" if stands_without else "")
+        + _soft_joint(robot),
         hint=_OVERLAP_HINT if stands_without else "",
         measured={
             "tilt": round(standing.tilt, 4),
@@ -139,6 +140,15 @@ def does_not_stand(robot: Facts) -> Violations:
             "lifted": len(standing.lifted_feet),
         },
     )
+
+
+def _soft_joint(robot: Facts) -> str:
+    """Return which stiffness the time step lowers, as a clause; empty if it lowers none."""
+    for name, gain in suggest_gains(robot).items():
+        reason = gain.reason.removeprefix("kp ").partition(";")[0]
+        if reason.startswith("stability limit"):
+            return f"; {name} has only {gain.stiffness:g} N m/rad, the {reason}"
+    return ""
 
 
 def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandResult:

@@ -1,8 +1,11 @@
 """Rule on mimic joints."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.model import Joint
+from terrainkit_robots.description.model import Joint, Mimic
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
+
+_MAX_EXCESS = 0.05
+"""Share of the positions of a follower that may be outside of its limits, for rounding."""
 
 
 @rule("JNT013", "invalid-mimic", "error", onboarding="blocks")
@@ -11,7 +14,9 @@ def invalid_mimic(robot: Facts) -> Violations:
 
     MuJoCo ignores the <mimic>, so that the joint stays limp, and rejects a joint that mimics
     itself. The positions of joints that mimic each other in a cycle are not defined. With a
-    multiplier of 0, which is a warning, the joint never moves.
+    multiplier of 0, which is a warning, the joint never moves. If it follows beyond its own limits,
+    the two contradict each other, and simulators stop one or both. That is a warning if more than
+    half of its positions are outside, and a note otherwise.
 
     Fix:
         Name the joint that is driven, and give the ratio of the two positions as the multiplier.
@@ -44,11 +49,30 @@ def invalid_mimic(robot: Facts) -> Violations:
             )
             continue
         else:
+            yield from _outside_limits(joint, target, joint.mimic)
             continue
         yield Violation(
             element=Part(joint.name, joint.mimic.source),
             message=f"mimic target of joint {joint.name}: got {got}; expected a joint that is "
             "driven",
+        )
+
+
+def _outside_limits(joint: Joint, target: Joint, mimic: Mimic) -> Violations:
+    """Yield a violation if a joint follows another one beyond its own limits."""
+    own, other = joint.range, target.range
+    if own is None or other is None:
+        return
+    low, high = sorted(mimic.multiplier * end + mimic.offset for end in other)
+    excess = max(own[0] - low, high - own[1])
+    if excess > _MAX_EXCESS * (high - low):
+        yield Violation(
+            element=Part(joint.name, mimic.source),
+            severity="warning" if excess > (high - low) / 2 else "note",
+            message=f"positions of joint {joint.name}, which follows {target.name}: got {low:.4g} "
+            f"to {high:.4g} {joint.unit}; expected positions within its limits of {own[0]:.4g} to "
+            f"{own[1]:.4g} {joint.unit}",
+            measured={"excess": excess},
         )
 
 

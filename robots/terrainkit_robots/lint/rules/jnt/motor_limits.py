@@ -164,7 +164,8 @@ def placeholder_limit(robot: Facts) -> Violations:
             expected = " and ".join(f"{most:.4g} {unit}" for _, most, unit in too_large.values())
             yield Violation(
                 element=Part(joint.name, joint.limit.source),
-                message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}; "
-                f"expected less than {expected} for a robot of {robot.total_mass:.4g} kg",
+                message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}, as in "
+                f"placeholders; expected the limit of the motor, which is below {expected} on a "
+                f"robot of {robot.total_mass:.4g} kg",
                 measured={name: value for name, (value, _, _) in too_large.items()},
             )

@@ -5,7 +5,6 @@ from collections import Counter
 import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.legs import mean_length
 from terrainkit_robots.analysis.legs.limbs import Limb
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.text import names
@@ -37,33 +36,6 @@ def _inverted_legs(robot: Facts) -> list[Limb]:
 
 def _joint_types(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
-
-
-@rule("LEG001", "detected-legs", "note")
-def detected_legs(robot: Facts) -> Violations:
-    """Lists the legs that were detected and the roles of their joints.
-
-    All findings on legs, feet and the standing pose depend on this detection. If it is wrong,
-    ignore those findings.
-
-    Fix:
-        No action if the legs are correct. If a leg is missing, check its joints and its last link.
-
-    Source:
-        Ends of the tree that are near the ground and have a mirror image, or names of legs, and
-        four or more equal limbs around the robot that reach the ground. Limbs with other names,
-        such as arms, are legs only if the robot does not stand without them.
-    """
-    roles = {leg.foot: " ".join(leg.roles) for leg in robot.legs}
-    if len(set(roles.values())) == 1:
-        listed = f"feet {', '.join(roles)}; joints of each leg: {roles[robot.legs[0].foot]}"
-    else:
-        listed = "; ".join(f"{foot}: {role}" for foot, role in roles.items())
-    yield Violation(
-        message=f"{len(robot.legs)} legs with a length of {mean_length(robot.legs):.3f} m; "
-        f"{listed}",
-        measured={"legs": len(robot.legs)},
-    )
 
 
 @rule("LEG002", "leg-count", "warning", onboarding="warns")

@@ -17,6 +17,7 @@ from terrainkit_robots.description.fix import Fix, make_fix
 from terrainkit_robots.description.package_resolver import (
     filename_on_disk,
     is_absolute,
+    is_folder,
     is_package_uri,
 )
 from terrainkit_robots.description.xml.document import read_bytes
@@ -98,8 +99,8 @@ def absolute_path(robot: Facts) -> Violations:
         All readers use absolute paths unchanged.
     """
     for used in robot.mesh_names:
-        if not _is_written_absolute(robot, used):
-            continue
+        if not _is_written_absolute(robot, used) or is_folder(used.mesh.path):
+            continue  # MSH006 reports a folder
         is_missing = not robot.meshes.exists(used.mesh.path)
         if is_missing:
             status = "which does not exist"
@@ -156,6 +157,8 @@ def package_uri(robot: Facts) -> Violations:
         has_host = used.name.lower().startswith("file:") and not is_absolute(used.name)
         if not (has_host or is_package_uri(used.name)) or is_missing(used):
             continue
+        if is_folder(used.mesh.path):
+            continue  # MSH006 reports it
         # A file of the same name in another folder may not be the one that ROS would find.
         fix = _relative_fix(robot, used, "safe" if _is_same_path(used) else "unsafe")
         scheme = "a host" if has_host else f"the package {_package_of(used.name)}"

@@ -8,6 +8,9 @@ from terrainkit_robots.analysis.name_words import MAX_NAME_LENGTH, split_name
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import names
 
+_MAX_NAMES = 2
+"""Number of matches in a message."""
+
 _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
 """Words by which configurations select the links whose contacts they penalize."""
 
@@ -41,11 +44,11 @@ def _foot_matches(robot: Facts) -> Iterator[str]:
     word = _unique_substring(feet, others)
     suggestion = f" ('{word}' matches exactly the feet)" if word else ""
     if len(missed) == len(feet) and not extra:
-        yield f"'foot' matches no link; the feet are {names(feet)}{suggestion}"
+        yield f"'foot' matches no link; the feet are {names(feet, _MAX_NAMES)}{suggestion}"
     elif missed:
-        yield f"'foot' does not match the feet {names(missed)}{suggestion}"
+        yield f"'foot' does not match the feet {names(missed, _MAX_NAMES)}{suggestion}"
     elif extra:
-        yield f"'foot' also matches {names(extra)}, which are not feet{suggestion}"
+        yield f"'foot' also matches {names(extra, _MAX_NAMES)}, which are not feet{suggestion}"
 
 
 def _unique_substring(feet: Sequence[str], others: Sequence[str]) -> str | None:
@@ -68,8 +71,8 @@ def _other_matches(robot: Facts) -> Iterator[str]:
     if not matches:
         yield f"'base' matches no link; the trunk is {truncate(robot.bodies[0].top.name)}"
     elif extra:
-        yield f"'base' also matches {names(extra)}, not part of the trunk"
+        yield f"'base' also matches {names(extra, _MAX_NAMES)}, not part of the trunk"
     for word in _LEG_WORDS:
         extra = [name for name in links if word in name and name not in in_legs | trunk]
         if extra:
-            yield f"'{word}' also matches {names(extra)}, not part of a leg"
+            yield f"'{word}' also matches {names(extra, _MAX_NAMES)}, not part of a leg"

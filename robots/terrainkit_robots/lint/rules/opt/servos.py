@@ -1,15 +1,21 @@
-"""Rules on position actuators and reference positions of an MJCF file."""
+"""Rules on position actuators, keyframes and reference positions of an MJCF file."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import joint_inertia
-from terrainkit_robots.simulation.written_model import make_written_model, position_servos
+from terrainkit_robots.simulation.written_model import (
+    compile_file,
+    make_written_model,
+    position_servos,
+)
 from terrainkit_robots.text import count
 
 # The models of MuJoCo Menagerie and Playground have 0.11 to 1.2, and robots of others 0.03.
@@ -19,7 +25,11 @@ halves."""
 
 # ANYmal of MuJoCo Menagerie shares one range between joints, 5.8 rad beyond the limits of one.
 _MAX_EXCESS = 2 * math.pi
-"""Distance of a target from the limits of its joint, at most [rad]: a turn."""
+"""Distance of a target from the limits of its joint that is only a note [rad]: a turn."""
+
+_TOLERANCE, _MAX_SHARE, _MAX_TARGET_ERROR = 1e-3, 0.01, 0.01
+"""Distance of a position from its limits that is attributed to rounding [rad], the same as a share
+of a small range, and the distance of a target [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +77,8 @@ def _actuator(robot: Facts, joint: str) -> Part:
     return Part(joint, sources.get(joint, robot.model.source))
 
 
-def _others(joints: int) -> str:
-    return f"; the same applies to {count(joints - 1, 'other joint')}" if joints > 1 else ""
+def _others(number: int, noun: str = "other joint") -> str:
+    return f"; the same applies to {count(number - 1, noun)}" if number > 1 else ""
 
 
 @rule("OPT010", "undamped-position-gain", "warning", needs=("mjcf", "legs", "simulation"))
@@ -104,12 +114,13 @@ def undamped_position_gain(robot: Facts) -> Violations:
         )
 
 
-@rule("OPT011", "excessive-control-range", "warning", needs=("mjcf", "legs", "simulation"))
+@rule("OPT011", "excessive-control-range", "warning", needs=("mjcf", "simulation"))
 def excessive_control_range(robot: Facts) -> Violations:
-    """The targets of a position actuator lie far beyond the limits of its joint.
+    """The targets of a position actuator lie beyond the limits of its joint.
 
-    A policy whose actions are scaled to ctrlrange commands mostly targets that the joint cannot
-    reach. MuJoCo reads ctrlrange in radians, even if the angles of the file are in degrees.
+    A policy whose actions are scaled to ctrlrange commands targets that the joint cannot reach.
+    MuJoCo reads ctrlrange in radians, even if the angles of the file are in degrees. Up to a turn
+    beyond the limits it is a note.
 
     Fix:
         Replace ctrlrange by inheritrange="1", or give the limits of the joint in radians.
@@ -117,20 +128,61 @@ def excessive_control_range(robot: Facts) -> Violations:
     Source:
         MuJoCo's XML reference, actuator: ctrlrange; position: inheritrange.
     """
-    found = [s for s in _servos(make_written_model(robot).model) if s.excess > _MAX_EXCESS]
+    found = [s for s in _servos(compile_file(robot)[1]) if s.excess > _MAX_TARGET_ERROR]
     if found:
         worst = max(found, key=lambda servo: servo.excess)
         low, high = worst.commands
         yield Violation(
             element=_actuator(robot, worst.joint),
+            severity=None if worst.excess > _MAX_EXCESS else "note",
             message=f"ctrlrange of the position actuator of joint {worst.joint}: got {low:g} to "
-            f"{high:g} rad, {worst.excess:.3g} rad beyond the limits of the joint; expected at "
-            f"most {_MAX_EXCESS:.2g} rad" + _others(len(found)),
+            f"{high:g} rad, {worst.excess:.3g} rad beyond the limits of the joint; expected "
+            "targets within them" + _others(len(found)),
             measured={"excess": worst.excess, "joints": len(found)},
         )
 
 
-@rule("OPT012", "reference-outside-limits", "warning", needs=("mjcf", "legs", "simulation"))
+@rule("OPT013", "keyframe-outside-limits", "warning", needs=("mjcf", "simulation"))
+def keyframe_outside_limits(robot: Facts) -> Violations:
+    """A keyframe has a position outside of the limits of its joint, or such a command.
+
+    MuJoCo loads it without a message. In the first steps the limit throws the joint back, and
+    MuJoCo replaces a command by the end of its ctrlrange, so that the robot leaves the pose.
+
+    Fix:
+        Move the value into the limits, or correct the limits.
+
+    Source:
+        MuJoCo's XML reference, keyframe. Up to 0.001 rad, or 1 % of a small range, is rounding.
+    """
+    import mujoco
+
+    spec, model = compile_file(robot)
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    (joints,) = np.nonzero(model.jnt_limited & np.isin(model.jnt_type, (slide, hinge)))
+    (motors,) = np.nonzero(model.actuator_ctrllimited)
+    for kind, field, columns, indices, ranges in (
+        ("joint", "qpos", model.jnt_qposadr[joints], joints, model.jnt_range),
+        ("actuator", "ctrl", motors, motors, model.actuator_ctrlrange),
+    ):
+        low, high = ranges[indices].T
+        values = getattr(model, f"key_{field}")[:, columns]
+        excess = np.maximum(low - values, values - high)
+        excess[[not len(getattr(key, field)) for key in spec.keys]] = 0
+        keys, outside = np.nonzero(excess > np.minimum(_TOLERANCE, _MAX_SHARE * (high - low)))
+        if len(keys):
+            key, column = int(keys[0]), int(outside[0])
+            name = getattr(model, kind)(int(indices[column])).name
+            yield Violation(
+                element=Part(name, robot.model.source),
+                message=f"{field} of {kind} {name} in keyframe {model.key(key).name or key + 1}: "
+                f"got {values[key, column]:.5g}; expected {low[column]:.5g} to {high[column]:.5g}"
+                + _others(len(keys), "other value"),
+                measured={"values": len(keys)},
+            )
+
+
+@rule("OPT012", "reference-outside-limits", "warning", needs=("mjcf", "simulation"))
 def reference_outside_limits(robot: Facts) -> Violations:
     """The reference position of a joint or of its spring lies outside its limits.
 
@@ -144,14 +196,20 @@ def reference_outside_limits(robot: Facts) -> Violations:
     Source:
         MuJoCo's XML reference, joint: ref, springref.
     """
-    model = make_written_model(robot).model
-    for name in ("ref", "springref"):
+    model = compile_file(robot)[1]
+    known = {model.joint(index).name for index in range(model.njnt)}
+    joints = [joint for joint in robot.joints if joint.name in known]
+    # The springs of grippers are preloaded.
+    floats = any(joint.kind == "floating" for joint in robot.model.joints)
+    for name in ("ref", "springref") if floats else ("ref",):
         found = []
-        for joint in robot.joints:
-            index, limits = model.joint(joint.name).id, joint.range
-            spring = float(model.qpos_spring[model.jnt_qposadr[index]])
-            value = joint.reference if name == "ref" else spring * (model.jnt_stiffness[index] > 0)
-            if limits and value != 0 and not limits[0] - 1e-3 <= value <= limits[1] + 1e-3:
+        for joint in joints:
+            limits, adr = joint.range, model.joint(joint.name).qposadr[0]
+            is_sprung = model.jnt_stiffness[model.joint(joint.name).id] > 0
+            spring = float(model.qpos_spring[adr]) if is_sprung else 0.0
+            value = joint.reference if name == "ref" else spring
+            low, high = limits or (-math.inf, math.inf)
+            if limits and value != 0 and not low - _TOLERANCE <= value <= high + _TOLERANCE:
                 found.append((joint, value, limits))
         if found:
             joint, value, (low, high) = found[0]

@@ -1,6 +1,6 @@
-"""Rules on the conventions of simulators: joint order, merged feet and armature."""
+"""Rule on what simulators make of the robot with their default options."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
@@ -9,53 +9,73 @@ from terrainkit_robots.analysis.simulator_conventions.armature import (
     GENESIS_ARMATURE,
     inertia_without_armature,
 )
-from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
-    KEEP_LINK_OPTIONS,
-    SIMULATORS,
-)
+from terrainkit_robots.analysis.simulator_conventions.fixed_joints import SIMULATORS
 from terrainkit_robots.analysis.simulator_conventions.joint_order import SimulatorOrder
 from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     dropped_mass,
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import UNITS, Part, Violation, Violations, rule
-from terrainkit_robots.text import conjunction
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rules.jnt.joint_limits import joints_without_zero
+from terrainkit_robots.text import conjunction, names
 
 _MAX_JOINTS = 40
 """Maximum number of joints for which the message contains the permutation."""
 
 
-@rule("SIM001", "joint-order", "note")
-def joint_order(robot: Facts) -> Violations:
-    """A simulator orders the joints differently from the file.
+@rule("SIM001", "simulator-defaults", "note")
+def simulator_defaults(robot: Facts) -> Violations:
+    """A simulator changes the robot with its default options.
 
-    The observations and actions of a policy are ordered by joint. A policy that was trained in one
-    simulator fails in another one, or on the real robot, unless they are reordered. Isaac Lab
-    traverses the tree breadth-first, the other simulators depth-first.
+    - **Joint order.** The observations and actions of a policy are ordered by joint. A policy that
+      was trained in one simulator fails in another one, or on the real robot, unless they are
+      reordered. Isaac Lab traverses the tree breadth-first, the other simulators depth-first.
+    - **Merged feet.** A foot on a fixed joint becomes a part of the shank: its name does not exist,
+      and contact forces are reported for the shank.
+    - **Welded trunk.** A URDF has no free joint, and MuJoCo merges a root link without joint into
+      the world: the robot cannot move, and its mass is too small. Other simulators make the base
+      floating by an option.
+    - **Armature.** Genesis sets the armature of a joint without one to 0.1 kg m2, ten times the
+      armature of a small legged robot. A joint that moves less inertia accelerates much more
+      slowly than in other simulators.
+    - **Start.** All joints start at 0, which the knees of most legs exclude: set the default
+      positions. JNT012 reports robots without legs.
 
     Fix:
         Address joints by name, or reorder by the printed list: `there = [here[i] for i in order]`,
-        where `here` is in the order of the file. The JSON report contains all orders under
-        `joint_orders`.
+        where `here` is in the order of the file; the JSON report has all orders. Keep feet by
+        `<mujoco><compiler fusestatic="false"/></mujoco>` in the URDF (MuJoCo),
+        `dont_collapse="true"` on the fixed joint (Isaac Gym, Isaac Lab) or `links_to_keep` of
+        gs.morphs.URDF (Genesis), whose `default_armature` is that of your motor. `terrainkit
+        onboard` writes an MJCF with a free joint.
 
     Source:
         Compared with MuJoCo's compiler, genesis-world 1.4.5, Isaac Sim's URDF importer, and
         published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
-        marked as unverified.
+        marked as unverified. Inertias are those of all links below a joint, all joints at 0.
     """
+    parts = [*_order(robot), *_feet(robot), *_trunk(robot), *_armature(robot)]
+    if robot.legs and (joints := joints_without_zero(robot)):
+        listed = names((joint.name for joint in joints), 4)
+        parts.append(f"joints start at 0, which is outside of the limits of {listed}")
+    if parts:
+        file = robot.file_order
+        others = [order for order in robot.simulator_orders if order.joints != file]
+        yield Violation(
+            message="; ".join(parts),
+            certainty="proven" if all(order.certain for order in others) else "likely",
+            measured={"joints": len(file)},
+        )
+
+
+def _order(robot: Facts) -> Iterator[str]:
+    """Yield how simulators order the joints."""
     file = robot.file_order
     others = [order for order in robot.simulator_orders if order.joints != file]
-    if not others:
-        return
-    same = [order.simulator for order in robot.simulator_orders if order not in others]
-    orders = "; ".join(_format_order(order, file) for order in others)
-    rest = f"; {conjunction(same)}: same as the file" if same else ""
-    yield Violation(
-        message=f"joint order, as indices into the file's order: {orders}{rest}",
-        certainty="proven" if all(order.certain for order in others) else "likely",
-        measured={"joints": len(file)},
-    )
+    if others:
+        orders = "; ".join(_format_order(order, file) for order in others)
+        yield f"joint order, as indices into the file's order: {orders}"
 
 
 def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
@@ -68,104 +88,40 @@ def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
     return f"{order.simulator}{unverified}: {indices}"
 
 
-@rule("SIM002", "merged-feet", "note", needs=("legs",))
-def merged_feet(robot: Facts) -> Violations:
-    """A simulator merges the feet into the shanks by default.
-
-    A foot on a fixed joint is then not a separate body: its name does not exist, and contact forces
-    are reported for the shank. Each simulator has its own option to keep it.
-
-    Fix:
-        MuJoCo: `<mujoco><compiler fusestatic="false"/></mujoco>` in the URDF. Isaac Gym and Isaac
-        Lab: `dont_collapse="true"` on the fixed joint. Genesis: name the feet in `links_to_keep` of
-        `gs.morphs.URDF`.
-
-    Source:
-        MuJoCo's `fusestatic`, which is enabled for URDF; legged_gym's `collapse_fixed_joints`;
-        Isaac Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
-    """
+def _feet(robot: Facts) -> Iterator[str]:
+    """Yield which simulators merge feet that have collision shapes."""
     loaded = loaded_robots(robot)
-    feet = {
-        leg.foot: {r.order.simulator: r.merged[leg.foot] for r in loaded if leg.foot in r.merged}
-        for leg in robot.legs
-        if robot.tree.links[leg.foot].collisions
-    }
-    merges = {foot: bodies for foot, bodies in feet.items() if bodies}
-    if not merges:
-        return
-    foot, bodies = next(iter(merges.items()))
-    by = [name for name in SIMULATORS if any(name in simulators for simulators in merges.values())]
-    more = ", ..." if len(merges) > 1 else ""
-    verb = "merges" if len(by) == 1 else "merge"
-    yield Violation(
-        element=Part(foot, robot.tree.parent_joint[foot].source),
-        message=f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
-        f"({foot} into {next(iter(bodies.values()))}{more})",
-        hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
-        measured={"feet": len(merges)},
-    )
+    feet = {leg.foot for leg in robot.legs if robot.tree.links[leg.foot].collisions}
+    merged = {r.order.simulator: sorted(feet & r.merged.keys()) for r in loaded}
+    by = [name for name in SIMULATORS if merged.get(name)]
+    if by:
+        verb = "merges" if len(by) == 1 else "merge"
+        foot = merged[by[0]][0]
+        body = next(r.merged[foot] for r in loaded if r.order.simulator == by[0])
+        yield (
+            f"{conjunction(by)} {verb} {max(map(len, merged.values()))} feet into their parent "
+            f"links, such as {foot} into {body}"
+        )
 
 
-@rule("SIM006", "welded-trunk", "note", needs=("legs",))
-def welded_trunk(robot: Facts) -> Violations:
-    """MuJoCo welds the trunk of a URDF to the world and drops its mass.
-
-    A URDF has no free joint, and MuJoCo merges a root link without joint into the world: the robot
-    cannot move, and its mass is too small. Other simulators make the base floating by an option.
-
-    Fix:
-        Convert the file to MJCF with a <freejoint/> in the trunk, as `terrainkit onboard` does. For
-        MuJoCo alone, an empty link `world` and a joint of type floating above the trunk have the
-        same effect; PyBullet turns such a joint into a fixed one.
-
-    Source:
-        Compared with MuJoCo 4.0. With `fusestatic="false"` the mass is kept, but the trunk does not
-        move either.
-    """
-    trunk = robot.bodies[0]
+def _trunk(robot: Facts) -> Iterator[str]:
+    """Yield that MuJoCo welds the trunk of a legged URDF to the world."""
     loaded = next((r for r in loaded_robots(robot) if r.order.simulator == "MuJoCo"), None)
-    if loaded is None or not is_welded(robot):
-        return
-    dropped = dropped_mass(robot)
-    drops = (
-        f" and drops its mass: {loaded.mass:.4g} of {loaded.mass + dropped:.4g} kg are left in "
-        f"{len(loaded.bodies)} bodies"
-        if dropped > 0
-        else ""
-    )
-    yield Violation(
-        element=trunk.main_link,
-        message=f"MuJoCo welds {trunk.name} to the world{drops}; expected a floating base",
-        measured={"dropped": dropped, "left": loaded.mass},
-    )
+    if robot.legs and loaded is not None and is_welded(robot):
+        dropped = dropped_mass(robot)
+        drops = f" and drops {dropped:.4g} of {loaded.mass + dropped:.4g} kg" if dropped > 0 else ""
+        yield f"MuJoCo welds {robot.bodies[0].name} to the world{drops}"
 
 
-@rule("SIM003", "genesis-armature", "note", needs=UNITS)
-def genesis_armature(robot: Facts) -> Violations:
-    """The default armature of Genesis exceeds the inertia that a joint moves.
-
-    Genesis sets the armature of a joint without one to 0.1 kg m2, ten times the armature of a small
-    legged robot. The joint accelerates much more slowly than in other simulators, and a policy
-    trained with it does not transfer.
-
-    Fix:
-        Set `default_armature` of gs.morphs.URDF or gs.morphs.MJCF to your motor's armature: rotor
-        inertia times the square of the gear ratio.
-
-    Source:
-        `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
-        is compared with the inertia about the joint axis of all links below, at joint positions 0.
-    """
+def _armature(robot: Facts) -> Iterator[str]:
+    """Yield that the armature of Genesis is larger than the inertia that joints move."""
     moved = inertia_without_armature(robot.bodies, robot.actuated)
     slowed = [inertia for inertia in moved.values() if inertia < GENESIS_ARMATURE]
-    if not slowed:
-        return
-    joint = min(moved, key=moved.__getitem__)
-    unit = joint.units.inertia
-    yield Violation(
-        element=joint,
-        message=f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia "
-        f"of {len(slowed)} of {len(robot.actuated)} joints; smallest: {joint.name} with "
-        f"{moved[joint]:.2g} {unit}",
-        measured={"inertia": moved[joint], "joints": len(slowed)},
-    )
+    if slowed:
+        joint = min(moved, key=moved.__getitem__)
+        unit = joint.units.inertia
+        yield (
+            f"the armature of Genesis, {GENESIS_ARMATURE} {unit}, exceeds the inertia that "
+            f"{len(slowed)} of {len(robot.actuated)} joints move, such as {moved[joint]:.2g} "
+            f"{unit} of {joint.name}"
+        )

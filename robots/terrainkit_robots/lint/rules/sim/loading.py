@@ -34,7 +34,7 @@ _EXPLAINED_BY: tuple[tuple[str, str], ...] = (
     (r"must be positive in geom", "COL004"),
     (r"no decoder found|unknown or unsupported mesh", "MSH005 MSH013"),
     (r"_decoder", "MSH006 MSH007 MSH008 MSH010 MSH013"),
-    (r"coplanar|mesh volume is too small", "MSH010"),
+    (r"coplanar|mesh (?:volume|surface area) is too small", "MSH010 MSH011"),
     (r"repeated element", "XML008 XML015"),
     (r"repeated URDF name|repeated name|repeated joint|repeated body", "TRE001 XML011"),
     (r"joint parent or child missing", "TRE002 XML013"),

@@ -94,13 +94,18 @@ def _same_way(robot: Facts) -> Violations:
 def same_way_follower(robot: Facts, pair: MirrorPair) -> Joint | None:
     """Return the joint of two mirrored fingers that follows the other one the same way.
 
-    Fingers slide along the line between them, or are named so: the wheels of an axle turn the same
-    way, as eyes do.
+    Both may follow a third joint. Fingers slide along the line between them, or are named so: the
+    wheels of an axle turn the same way, as eyes do.
     """
     for side, other in ((pair.left, pair.right), (pair.right, pair.left)):
         joint, bodies = side.joint, (side.body, other.body)
-        mimic = joint.mimic
-        if mimic is None or mimic.joint != other.joint.name or mimic.multiplier * pair.sign >= 0:
+        mimic, same = joint.mimic, other.joint.mimic
+        if mimic is None:
+            continue
+        ratio = mimic.multiplier if mimic.joint == other.joint.name else 0.0
+        if same is not None and mimic.joint == same.joint:
+            ratio = mimic.multiplier * same.multiplier
+        if ratio * pair.sign >= 0:
             continue
         if joint.kind != "prismatic":
             names = (joint.name, *(body.top.name for body in bodies))

@@ -9,7 +9,8 @@ def invalid_number(robot: Facts) -> None:
     """An attribute is not a number, or has too few or too many numbers.
 
     Readers disagree about invalid numbers: "0,5" is 0 or an error, and a missing third coordinate
-    is 0 or undefined. NaN spreads through the whole simulation.
+    is 0 or undefined. NaN spreads through the whole simulation. A version of <robot> other than 1.0
+    to 1.2, which urdfdom rejects, is a warning.
 
     Fix:
         Write numbers with a decimal point, separated by spaces.
@@ -42,16 +43,18 @@ def unread_element(robot: Facts) -> None:
 
     URDF readers silently skip a <ros2_control> or a <transmission> inside of <gazebo>, and a link
     inside of another one. They skip <pose> of SDF as well, so that a joint without an <origin>
-    lies in the frame of its parent. A joint of SDF inside of <gazebo> closes a loop; it is reported
-    if it cannot.
+    lies in the frame of its parent. Damping as an attribute of <limit> or as an element in
+    <dynamics>, an <origin> of a link, and an element of another name with the attributes of
+    <dynamics> have no effect either. A joint of SDF inside of <gazebo> closes a loop; it is
+    reported if it cannot.
 
     Fix:
         Make the element a child of <robot>, or write what the message names.
 
     Source:
-        Issue 1602 of ros2_control and issue 2 of botanbot_sim; wiki.ros.org/urdf/XML. The contents
-        of plugins, sensors and other extensions, and links of SDF inside of <gazebo>, are not
-        checked.
+        Issue 1602 of ros2_control, issue 2 of botanbot_sim, issue 1469 of bullet3 and issue 18796
+        of drake; wiki.ros.org/urdf/XML. The contents of plugins, sensors and other extensions, and
+        links of SDF inside of <gazebo>, are not checked.
     """
 
 

@@ -48,7 +48,7 @@ def spec_feet(robot: Facts) -> Violations:
         List in feet the link on which each leg stands, one for each leg.
 
     Source:
-        The legs that LEG001 detects.
+        The legs of the summary of the report.
     """
     feet = robot.required_spec.feet
     if any(name not in robot.body_of for name in feet):
