@@ -74,6 +74,7 @@ def roll(host: Host, behavior: str) -> Rollout:
     rises, terminated, ended = np.zeros((3, host.num_envs))
     steps: list[Step] = []
     running = []
+    start = host.qpos() if behavior == "scattered" else np.zeros(0)
     path = MotionPath(host, is_moving=behavior != "stepping") if behavior in MOVED else None
     if behavior == "fall":
         host.set_state(*lying(host))
@@ -81,7 +82,7 @@ def roll(host: Host, behavior: str) -> Rollout:
         if behavior in ("random", "scattered"):
             actions = host.std * rng.normal(size=actions.shape)
         if behavior == "scattered":
-            host.set_state(*scattered(host, rng))
+            host.set_state(*scattered(host, start, rng))
         elif behavior == "policy":
             actions = host.policy()
         motion = path.next_motion() if path else None
@@ -154,9 +155,16 @@ def lying(host: Host) -> Motion:
     return Motion(qpos, np.zeros((len(qpos), host.model.nv)))
 
 
-def scattered(host: Host, rng: np.random.Generator) -> Motion:
-    """Return random states, which reach the penalties that healthy behaviors do not."""
-    qpos = host.qpos()
+def scattered(host: Host, start: Array, rng: np.random.Generator) -> Motion:
+    """Return random states, which reach the penalties that healthy behaviors do not.
+
+    Args:
+        host: The environment.
+        start: Positions after the reset, shape (n, nq); bases are between these and the ground.
+        rng: Generator of the random numbers.
+    """
+    qpos = start.copy()
+    qpos[:, host.height] -= host.default_qpos[host.height] * rng.random(len(qpos))
     joints = host.model.nv - 3 * host.height  # after 6 speeds of a free base, or 3 in a plane
     scatter = rng.normal(size=(len(qpos), joints))
     qpos[:, -joints:] = host.default_qpos[-joints:] + JOINT_SCATTER * scatter
