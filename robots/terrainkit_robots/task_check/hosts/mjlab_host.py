@@ -6,8 +6,11 @@ import io
 from pathlib import Path
 from typing import Any
 
+import mjlab.tasks  # noqa: F401 - registers the tasks
 import numpy as np
 import torch
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.tasks.registry import list_tasks, load_env_cfg
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
@@ -26,15 +29,12 @@ def load_cfg(task: str) -> Any:
     Raises:
         ConfigError: If there is no such task.
     """
-    importlib.import_module("mjlab.tasks")  # which registers the tasks
-    registry = importlib.import_module("mjlab.tasks.registry")
     module, _, name = task.rpartition(":")
     if module:
         importlib.import_module(module)
-    known = registry.list_tasks()
-    if name not in known:
+    if name not in (known := list_tasks()):
         raise ConfigError(f"no task {name} in mjlab; {expected_names(name, known, 'tasks are')}")
-    return registry.load_env_cfg(name)
+    return load_env_cfg(name)
 
 
 class MjlabHost(Host):
@@ -57,8 +57,7 @@ class MjlabHost(Host):
         for command in cfg.commands.values():
             command.rel_standing_envs = 0.0
         with contextlib.redirect_stdout(io.StringIO()):
-            environment = importlib.import_module("mjlab.envs").ManagerBasedRlEnv
-            self.env = env = environment(cfg, device="cpu")
+            self.env = env = ManagerBasedRlEnv(cfg, device="cpu")
         self.file, self.dt, self.model = Path(task), env.step_dt, env.sim.mj_model
         self.num_envs, self.num_actions = NUM_ENVS, env.action_manager.total_action_dim
         rewards, observed = env.reward_manager, env.observation_manager
