@@ -47,7 +47,7 @@ class CheckTask(Command):
     terrain: TerrainName = ""
     """plane, a map (.npz), or a map config (.toml); by default, plane or the terrain of the run."""
 
-    format: Literal["text", "json", "sarif", "github", "markdown"] = "text"
+    format: Literal["text", "json", "sarif", "github"] = "text"
     """Format of the report."""
 
     picture: Annotated[Path, option("PNG")] | None = None

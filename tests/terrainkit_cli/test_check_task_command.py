@@ -39,6 +39,35 @@ def test_formats_and_exit_code(here):
     assert {rule["id"][:3] for rule in sarif["tool"]["driver"]["rules"]} == {"TSK"}
 
 
+def test_environment_without_states_is_checked_as_far_as_it_goes(here):
+    pytest.importorskip("gymnasium")
+    run = here("Pendulum-v1")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.splitlines()[0].split() == ["reward", "statue", "random"]
+    assert "rules: the environment has no set_state" in run.stdout
+
+
+BROKEN = """
+import gymnasium
+class Broken(gymnasium.Env):
+    action_space = observation_space = gymnasium.spaces.Box(-1, 1, (2,))
+    def reset(self, *, seed=None, options=None):
+        return self.observation_space.sample(), {}
+    def step(self, action):
+        raise KeyError("no key")
+gymnasium.register("Broken-v0", Broken)
+"""
+
+
+def test_broken_environment_is_one_line(here, tmp_path, monkeypatch):
+    pytest.importorskip("gymnasium")
+    (tmp_path / "broken_env.py").write_text(BROKEN)
+    monkeypatch.syspath_prepend(tmp_path)
+    run = here("broken_env:Broken-v0")
+    assert run.returncode == 2
+    assert "error: broken_env:Broken-v0: KeyError: 'no key'" in run.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

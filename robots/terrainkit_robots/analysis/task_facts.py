@@ -139,6 +139,6 @@ class TaskFacts:
         Scattered robots are left out: their rewards only show which terms can change.
         """
         behaviors = (name for name in self.rollouts if name != "scattered")
-        means = {name: self.rollout(name).means.round(6).tolist() for name in behaviors}
+        means = {name: (self.rollout(name).means.round(6) + 0).tolist() for name in behaviors}
         rewards = {name: dict(zip(self.terms, row, strict=True)) for name, row in means.items()}
         return {"host": self.host, "rewards": rewards}

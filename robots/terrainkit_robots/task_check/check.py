@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
 from terrainkit_robots.lint.check import select_rules
 from terrainkit_robots.lint.runner import Report, lint
 from terrainkit_robots.lint.settings import Settings
@@ -36,17 +36,20 @@ def open_host(
 
     Raises:
         ConfigError: If there is no such task.
+        PluginError: If the environment of another framework fails.
     """
     if host != "terrainkit" and (task_file or terrain):
         raise ConfigError(f"--task, --terrain: got a value for {host}; expected none")
     if host == "gymnasium":
         from terrainkit_robots.task_check.hosts.gymnasium_host import GymnasiumHost
 
-        return GymnasiumHost(task)
+        with plugin_errors(task, TerrainkitError):
+            return GymnasiumHost(task)
     if host == "mjlab":
         from terrainkit_robots.task_check.hosts.mjlab_host import MjlabHost, load_cfg
 
-        return MjlabHost(task, load_cfg(task))
+        with plugin_errors(task, TerrainkitError):
+            return MjlabHost(task, load_cfg(task))
     return _open_own(task, task_file, terrain)
 
 
@@ -81,7 +84,13 @@ def check_task(
     Returns:
         The report. Its `facts` are the `TaskFacts`; rules that the host does not support are
         skipped, with the reason.
+
+    Raises:
+        PluginError: If the environment of another framework fails.
     """
     selected, ignored = select_rules(settings or Settings(), "task")
-    report = lint(measure_task(host, progress), selected)
+    foreign = str(host.file) if host.name != "terrainkit" else None
+    with plugin_errors(foreign, TerrainkitError):
+        facts = measure_task(host, progress)
+    report = lint(facts, selected)
     return replace(report, skipped=(*report.skipped, *ignored))

@@ -25,27 +25,20 @@ class GymnasiumHost(Host):
         options: Arguments of the environment.
 
     Raises:
-        ConfigError: If there is no such environment, or its spaces are of another kind.
+        ConfigError: If its spaces are of another kind.
     """
 
     name = "gymnasium"
 
     def __init__(self, env_id: str, **options: Any) -> None:
         super().__init__()
-        try:
-            self.envs = [gymnasium.make(env_id, **options) for _ in range(NUM_ENVS)]
-        except (gymnasium.error.Error, ImportError, TypeError, ValueError) as error:
-            raise ConfigError(f"{env_id}: {' '.join(str(error).split())}") from error
+        self.envs = [gymnasium.make(env_id, **options) for _ in range(NUM_ENVS)]
         env = self.envs[0]
         for space in (env.action_space, env.observation_space):
             if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
                 raise ConfigError(f"{env_id}: got the space {space}; expected a Box with one axis")
-        self.file, self.num_envs, self.num_actions = (
-            Path(env_id),
-            NUM_ENVS,
-            env.action_space.shape[0],
-        )
-        numbers = env.observation_space.shape[0]
+        self.file, self.num_envs = Path(env_id), NUM_ENVS
+        (self.num_actions,), (numbers,) = env.action_space.shape, env.observation_space.shape
         structure = getattr(env.unwrapped, "observation_structure", {})
         parts = {k: n for k, n in structure.items() if not k.startswith("skipped")}
         if sum(parts.values()) != numbers:

@@ -74,9 +74,8 @@ class MjlabHost(Host):
         self.default_qpos[:7] = robot.data.default_root_state[0, :7].numpy()
         self.default_qpos[7 : 7 + len(pose)] = pose
         commands = map(env.command_manager.get_term, env.command_manager.active_terms)
-        self._command: Any = next(
-            (term for term in commands if hasattr(term, "vel_command_b")), None
-        )
+        velocities = [term for term in commands if hasattr(term, "vel_command_b")]
+        self._command: Any = velocities[0] if velocities else None
         if self._command is None:
             self.missing |= dict.fromkeys(("moving", "commands"), "the task has no velocity")
         else:

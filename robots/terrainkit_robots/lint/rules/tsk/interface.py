@@ -88,10 +88,8 @@ def action_range(task: TaskFacts) -> Violations:
     torque = task.value("action_torque")
     worst = int(np.argmax(torque))
     if torque[worst] > 1:
-        share = f"{torque[worst]:.2g} of the effort of {task.joints[worst]}"
-        yield violation(
-            task, task.joints[worst], f"an action of 1 asks for {share}; the limit is 1"
-        )
+        share = f"asks for {torque[worst]:.2g} of the effort of {task.joints[worst]}"
+        yield violation(task, task.joints[worst], f"an action of 1 {share}; the limit is 1")
 
 
 @rule("TSK019", "asymmetric", "note")
