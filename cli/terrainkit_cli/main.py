@@ -194,7 +194,7 @@ def _package_errors() -> Iterator[None]:
 
 def _print_overview() -> None:
     # The text fits into 24 lines, the size of a terminal.
-    render.result(f"usage: terrainkit COMMAND [--help]; also --version, {', '.join(_UNLISTED)}.")
+    render.result(f"usage: terrainkit COMMAND [-h]; --version, {', '.join(_UNLISTED)}.")
     rows: list[tuple[str, str]] = []
     for group, summaries in COMMAND_GROUPS.items():
         rows += [(f"{group}:", "")] if group else []
