@@ -231,8 +231,8 @@ def rules_page() -> str:
     parts = [
         "# The rules of check-robot and check-task\n",
         NOTE,
-        "The rules that `terrainkit check-robot` runs on robots, and `terrainkit check-task` on tasks",
-        "(family TSK). An error breaks training or a simulator. A",
+        "The rules that `terrainkit check-robot` runs on robots, and `terrainkit check-task` on",
+        "tasks (family TSK). An error breaks training or a simulator. A",
         "warning is a likely mistake that should be corrected. A note needs no correction. `--fix`",
         "applies fixes that do not change the robot for any parser that accepts the file.",
         "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
