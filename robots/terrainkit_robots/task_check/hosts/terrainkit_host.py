@@ -55,12 +55,12 @@ class TerrainkitHost(Host):
         env.sim.step = self._step_or_move  # type: ignore[method-assign]
         env._compute_state = self._state_in_gait  # type: ignore[method-assign]
         self.behaviors += ("stepping",)
-        if not terrain.is_plane:
-            self.behaviors += ("staying", "climbing")
-            self.steps = env.max_episode_length
         if spec.checkpoint or spec.policy:
             self.behaviors += ("policy",)
             self._policy = load_policy(spec, env)
+        if not terrain.is_plane:
+            self.behaviors += ("staying", "climbing")  # last, since they change the levels
+            self.steps = env.max_episode_length
         if not env.gait.period:
             self.missing["stepping"] = "the task has no gait"
         if not env.has_velocity:

@@ -142,6 +142,15 @@ def test_constant_observation_is_named():
         ({"targets": np.array([[-1.1], [0.0], [1.1]])}, {"TSK018"}),
         ({"targets": np.array([[-0.9], [0.0], [1.1]])}, set()),
         ({"action_torque": np.array([1.01])}, {"TSK018"}),
+        (
+            {
+                "joints": (),
+                "targets": np.zeros((3, 0)),
+                "limits": np.zeros((2, 0)),
+                "action_torque": np.zeros(0),
+            },
+            set(),
+        ),
         ({"asymmetry": "left and right differ"}, {"TSK019"}),
         ({"commands": np.zeros((9, 3))}, {"TSK020"}),
         ({"max_speed": 0.9}, {"TSK020"}),

@@ -81,15 +81,17 @@ def action_range(task: TaskFacts) -> Violations:
     targets, (lower, upper) = task.value("targets"), task.value("limits")
     default = (targets[1] < lower - 1e-6) | (targets[1] > upper + 1e-6)
     both = (targets.min(axis=0) < lower) & (targets.max(axis=0) > upper)
-    for wrong, what in ((default, "the default pose is"), (both, "both standard deviations are")):
+    torque = task.value("action_torque")
+    largest = f"{torque.max(initial=0):.2g} times the effort"
+    checks = (
+        (default, "the default pose is beyond the limits"),
+        (both, "targets of both standard deviations are beyond the limits"),
+        (torque > 1, f"an action of 1 asks for up to {largest}"),
+    )
+    for wrong, what in checks:
         if wrong.any():
             which = names(np.array(task.joints)[wrong].tolist())
-            yield violation(task, which, f"{what} beyond the limits of {which}")
-    torque = task.value("action_torque")
-    worst = int(np.argmax(torque))
-    if torque[worst] > 1:
-        share = f"asks for {torque[worst]:.2g} of the effort of {task.joints[worst]}"
-        yield violation(task, task.joints[worst], f"an action of 1 {share}; the limit is 1")
+            yield violation(task, which, f"{what} of {which}")
 
 
 @rule("TSK019", "asymmetric", "note")
