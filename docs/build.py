@@ -51,7 +51,7 @@ from terrainkit.terrain.terrain_docs import TerrainDoc, overlay_doc, parameter_t
 from terrainkit.views.preview import render_preview, write_preview
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
-from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
+from terrainkit_robots.lint.rule import FAMILIES, TASK_FAMILIES, Rule, rules
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rendering.robot_images import render_robot
 from terrainkit_robots.rl.config import Task
@@ -229,22 +229,24 @@ def paper_section(name: str) -> str:
 
 def rules_page() -> str:
     parts = [
-        "# The rules of check-robot\n",
+        "# The rules of check-robot and check-task\n",
         NOTE,
-        "The rules that `terrainkit check-robot` runs. An error breaks training or a simulator. A",
+        "The rules that `terrainkit check-robot` runs on robots, and `terrainkit check-task` on",
+        "tasks (family TSK). An error breaks training or a simulator. A",
         "warning is a likely mistake that should be corrected. A note needs no correction. `--fix`",
         "applies fixes that do not change the robot for any parser that accepts the file.",
         "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
     ]
-    for family, about in FAMILIES.items():
+    every = rules() + rules("task")
+    for family, about in (FAMILIES | TASK_FAMILIES).items():
         parts.append(f"## {family}: {about.title}\n\n| rule | violation | severity | fix |")
         parts.append("|---|---|---|---|")
-        for rule in rules():
+        for rule in every:
             if rule.family == family:
                 link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
                 severity, fix = rule.severity, FIXED[rule.fixes]
                 parts.append(f"| {link} | {markup(rule.page.title)} | {severity} | {fix} |")
-        parts += ["", *(rule_section(rule) for rule in rules() if rule.family == family)]
+        parts += ["", *(rule_section(rule) for rule in every if rule.family == family)]
     return "\n".join(parts)
 
 

@@ -35,11 +35,11 @@ COMMAND_GROUPS = {
     },
     "Robots": {
         "check-robot": "Check URDF, xacro and MJCF files for errors.",
-        "rule": "Explain a rule of check-robot, or list all rules.",
+        "rule": "Explain a rule of check-robot or check-task, or list all rules.",
         "onboard": "Convert a robot file into a folder that is ready for training.",
+        "check-task": "Measure what a task pays for before it is trained.",
         "smoke-test": "Check in a minute whether a robot can be trained.",
         "train": "Train a policy for a robot on a terrain, and save it as a run.",
-        "average": "Average the networks of the last checkpoints of a run.",
         "evaluate": "Measure velocity errors, gait, falls and success of a policy.",
         "play": "Record a video of a policy, and print its errors and falls.",
         "check-policy": "Check whether a policy, its contract and a robot fit together.",
@@ -55,7 +55,7 @@ _MODULES = {
 }
 """Modules of the commands that have no module of their own."""
 
-_UNLISTED = ["import-config", "completion"]
+_UNLISTED = ["average", "import-config", "completion"]
 """Commands without a line in the overview, which has no more lines than a terminal."""
 
 COMMANDS = [name for group in COMMAND_GROUPS.values() for name in group] + _UNLISTED
@@ -194,7 +194,7 @@ def _package_errors() -> Iterator[None]:
 
 def _print_overview() -> None:
     # The text fits into 24 lines, the size of a terminal.
-    render.result(f"usage: terrainkit COMMAND [--help]; also --version, {', '.join(_UNLISTED)}.")
+    render.result(f"usage: terrainkit COMMAND [-h]; --version, {', '.join(_UNLISTED)}.")
     rows: list[tuple[str, str]] = []
     for group, summaries in COMMAND_GROUPS.items():
         rows += [(f"{group}:", "")] if group else []

@@ -312,7 +312,7 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule(Command):
-    """Explain a rule of check-robot, or list all rules."""
+    """Explain a rule of check-robot or check-task, or list all rules."""
 
     code: Annotated[str, positional("[CODE]")] = ""
     """Code of the rule, such as INR001, or its name."""
@@ -331,7 +331,7 @@ class Rule(Command):
             return 0
         for name, family in families().items():
             render.result(f"{name}: {family.title}")
-            members = [rule for rule in rules() if rule.family == name]
+            members = [r for r in rules() + rules("task") if r.family == name]
             render.table(
                 [
                     (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.page.title)

@@ -26,6 +26,8 @@ from terrainkit.map.validate import validate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.task_check.check import check_task
+from terrainkit_robots.task_check.hosts.mjlab_host import MjlabHost, load_cfg
 
 folder = Path(sys.argv[1])
 os.chdir(folder)
@@ -157,3 +159,11 @@ print(
     f"import: height error median {np.median(errors) * 1e3:.1f} mm, 90 % within "
     f"{np.quantile(errors, 0.9) * 1e3:.0f} mm; {kept.mean():.0%} of the origins kept"
 )
+
+# The behaviors of check-task run in mjlab's own step.
+task = "Mjlab-Velocity-Flat-Unitree-Go1"
+report = check_task(MjlabHost(task, load_cfg(task)))
+assert report.findings == (), report.findings
+earned = {name: report.facts.total(name) for name in ("statue", "moving", "random")}
+assert earned["random"] < earned["statue"] < 0.8 * earned["moving"], earned
+print("check-task: " + ", ".join(f"{name} earns {value:.2f}" for name, value in earned.items()))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
@@ -25,8 +26,10 @@ class Suppressed(Skipped):
     """None for a finding in the baseline file."""
 
 
-def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
-    """Return the rules that the settings select.
+def select_rules(
+    settings: Settings, subject: Literal["robot", "task"] = "robot"
+) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
+    """Return the rules of robots or of tasks that the settings select.
 
     Returns:
         Selected rules, and ignored rules with the reasons.
@@ -38,7 +41,7 @@ def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, .
     reasons = {
         rule.code: reason for word, reason in settings.ignore.items() for rule in matching(word)
     }
-    candidates = [rule for rule in rules() if rule in named or not settings.select]
+    candidates = [rule for rule in rules(subject) if rule in named or not settings.select]
     selected = tuple(rule for rule in candidates if rule.code not in reasons)
     ignored = tuple(
         Skipped(code=rule.code, kind="ignored", reason=f"ignored: {reasons[rule.code]}")

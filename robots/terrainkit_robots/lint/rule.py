@@ -29,7 +29,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, get_args
 
 from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
@@ -117,6 +117,9 @@ FAMILIES = {
     "DYN": Family(title="simulation", needs=(*COMPLETE, *UNITS)),
 }
 """The families by the letters of their codes, in the order in which their rules run."""
+
+TASK_FAMILIES = {"TSK": Family(title="training tasks")}
+"""The families of `terrainkit check-task`, whose rules take the `TaskFacts` of a task."""
 
 IMPORTANCE = (
     "UNI",  # one cause of many findings
@@ -214,8 +217,9 @@ class Finding(Violation):
 
 Violations = Iterator[Violation]
 
-Check = Callable[["Facts"], Violations | None]
-"""A generator of violations. A function without code reports what the readers recorded."""
+Check = Callable[[Any], Violations | None]
+"""A generator of violations of `Facts`, or of `TaskFacts` in the families of tasks. A function
+without code reports what the readers recorded."""
 
 
 class RulePage(NamedTuple):
@@ -340,7 +344,8 @@ def _plugins() -> tuple["EntryPoint", ...]:
 def families() -> Mapping[str, Family]:
     """Return the families by the letters of their codes, other packages' last."""
     plugins = {point.name: Family(title=f"rules of {point.module}") for point in _plugins()}
-    return FAMILIES | {name: family for name, family in plugins.items() if name not in FAMILIES}
+    own = FAMILIES | TASK_FAMILIES
+    return own | {name: family for name, family in plugins.items() if name not in own}
 
 
 def rule(
@@ -383,8 +388,8 @@ def rule(
 
 
 @cache
-def rules() -> tuple[Rule, ...]:
-    """Return all rules, sorted by family, then by number.
+def rules(subject: Literal["robot", "task"] = "robot") -> tuple[Rule, ...]:
+    """Return the rules of robots or of tasks, sorted by family, then by number.
 
     Raises:
         ConfigError: if the rules of another package cannot be loaded.
@@ -395,7 +400,7 @@ def rules() -> tuple[Rule, ...]:
         importlib.import_module(module.name)
     for point in _plugins():
         with plugin_errors(f"rules {point.name} ({point.value}) cannot be loaded"):
-            if point.name in FAMILIES or not re.fullmatch("[A-Z]{3}", point.name):
+            if point.name in FAMILIES | TASK_FAMILIES or not re.fullmatch("[A-Z]{3}", point.name):
                 raise ConfigError(f"family: got {point.name}; expected three other capital letters")
             known = set(_RULES)
             point.load()
@@ -403,7 +408,8 @@ def rules() -> tuple[Rule, ...]:
                 if not code.startswith(point.name):
                     raise ConfigError(f"rule code: got {code}; expected {point.name} and digits")
     order = list(families())
-    return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
+    found = (r for r in _RULES.values() if (r.family in TASK_FAMILIES) == (subject == "task"))
+    return tuple(sorted(found, key=lambda r: (order.index(r.family), r.code)))
 
 
 def get_rule(code_or_name: str) -> Rule:
@@ -415,11 +421,12 @@ def get_rule(code_or_name: str) -> Rule:
     Raises:
         ConfigError: if there is no such rule.
     """
-    known = {key: rule for rule in rules() for key in (rule.code, rule.name)}
+    every = rules() + rules("task")
+    known = {key: rule for rule in every for key in (rule.code, rule.name)}
     for key, rule in known.items():
         if key.lower() == code_or_name.lower():
             return rule
-    names = [rule.code for rule in rules() if code_or_name.upper().startswith(rule.family)]
+    names = [rule.code for rule in every if code_or_name.upper().startswith(rule.family)]
     prefix = "there are" if names else "expected a code or a name of the families"
     suggestion = expected_names(
         code_or_name, names or families(), prefix, closest(code_or_name, known)

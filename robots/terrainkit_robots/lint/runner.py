@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Literal
+from typing import Any, Literal
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
@@ -46,9 +46,11 @@ class Skipped:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """The result of linting one robot."""
+    """The result of linting one robot or task."""
 
-    facts: Facts
+    facts: Any
+    """The `Facts` of the robot, or the `TaskFacts` of a task."""
+
     findings: tuple[Finding, ...]
     """Findings, the most important first: by severity, family, rule, file and line."""
 
@@ -83,13 +85,13 @@ MAX_FINDINGS = 50
 """Maximum number of findings of one rule."""
 
 
-def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Report:
+def lint(facts: Any, selected: Sequence[Rule], *, simulate: bool = True) -> Report:
     """Return the report of the selected rules on a robot.
 
     An exception in one rule does not affect the others. It is recorded in `Report.skipped`.
 
     Args:
-        facts: The robot.
+        facts: The `Facts` of the robot, or the `TaskFacts` of a task.
         selected: Rules to run. One that lacks an input is skipped, with the reason.
         simulate: Whether rules may simulate the robot, which takes one or two seconds.
     """

@@ -95,9 +95,10 @@ def matching(word: str) -> tuple[Rule, ...]:
         ConfigError: if there is none.
     """
     code, name = word.strip().upper(), word.strip().lower()
-    found = tuple(r for r in rules() if code and (r.code.startswith(code) or r.name == name))
+    every = rules() + rules("task")
+    found = tuple(r for r in every if code and (r.code.startswith(code) or r.name == name))
     if not found:
-        near = closest(name, [rule.name for rule in rules()])
+        near = closest(name, [rule.name for rule in every])
         meant = f"did you mean {near}? Expected" if near else "expected"
         raise ConfigError(
             f"no rule {word!r}; {meant} a code, a prefix of one, or a name, of the families "

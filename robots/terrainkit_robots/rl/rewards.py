@@ -226,7 +226,7 @@ def feet_gait(env: "LeggedEnv") -> FloatArray:
     return (env.state.foot_contact == (env.state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
 
 
-def _swing_height(env: "LeggedEnv") -> np.float32:
+def target_swing_height(env: "LeggedEnv") -> np.float32:
     """Return the height of a swinging foot above the ground [m]."""
     setting = env.cfg.rewards.swing_height
     feet = env.state.foot_height.shape[1]
@@ -240,7 +240,10 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     The arc is above the edge ahead of a foot: in front of a riser, the foot has to rise before it
     is above the step, and above a gap it does not have to descend.
     """
-    phase, height = env.state.swing_phase, env.state.foot_height_over_edges / _swing_height(env)
+    phase, height = (
+        env.state.swing_phase,
+        env.state.foot_height_over_edges / target_swing_height(env),
+    )
     # Clipped for the same reason as the base height: a foot may be above or in a hole. With the
     # limit 0, a foot before a riser gained nothing by rising until it was above the step.
     return (np.square(np.clip(height, -1, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
@@ -253,7 +256,7 @@ def foothold(env: "LeggedEnv") -> FloatArray:
     foot is out of a hole. A point counts by its depth, up to the height of a swinging foot.
     """
     state = env.state
-    depth = np.clip(state.foot_ground_depth / _swing_height(env), 0, 1).mean(axis=2)
+    depth = np.clip(state.foot_ground_depth / target_swing_height(env), 0, 1).mean(axis=2)
     lands = (state.swing_phase == 0) | (state.swing_phase > LANDING)
     return (depth * lands).mean(axis=1)
 
@@ -302,7 +305,7 @@ def feet_air_time(env: "LeggedEnv") -> FloatArray:
 
 def foot_clearance(env: "LeggedEnv") -> FloatArray:
     """Reward feet that move at the swing height, 0 to 1, as in LeggedGym-Ex."""
-    error = np.square(env.state.foot_height - _swing_height(env))
+    error = np.square(env.state.foot_height - target_swing_height(env))
     speed = np.linalg.norm(env.state.foot_vel[..., :2], axis=2)
     return np.exp(-(error * speed).sum(axis=1) / np.float32(CLEARANCE_SIGMA))
 

@@ -4,7 +4,6 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
+from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.policy.evaluate import eval_task
@@ -19,18 +19,18 @@ from terrainkit_robots.policy.load_policy import single_torch_thread
 from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
-from terrainkit_robots.rl.rewards import is_moving
-from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import default_task, get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.simulation.step_response import MAX_RISE_TIME, step_responses
 from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
 from terrainkit_robots.spec.robot_arrays import Robot
-from terrainkit_robots.text import count, names
+from terrainkit_robots.task_check.check import check_task
+from terrainkit_robots.task_check.hosts.terrainkit_host import TerrainkitHost
+from terrainkit_robots.text import count, group, names
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of the lowest foot above and below the ground [m], and of the base, relative to its
@@ -46,9 +46,6 @@ STAND = "stands with zero action"
 NUM_ENVS = 16
 """Number of robots."""
 
-RANDOM_STEPS = 100
-"""Steps with random actions, after which every reward should have been other than 0."""
-
 DEFAULT_SAMPLES, MIN_TREND_SAMPLES = 100_000, 50_000
 """Samples of the short training, and the fewest that show whether a robot learns."""
 
@@ -60,11 +57,6 @@ MAX_DEVIATIONS, MAX_INCREASE = 3.0, 0.25
 """Limits of an increase of the falls, in standard deviations, and per robot [1/s]. Robots that
 begin to step fall more often than those that stand: by up to 0.11 in 24 trainings of 8 robots
 from healthy files."""
-
-# Half of `rewards.STANDING_TRACKING` is 0.125.
-MAX_STANDING, MAX_ACTION_TORQUE = 0.135, 1.0
-"""Limits of the share of the tracking rewards that standing earns, and of the torque of an action
-of 1 at the default pose, relative to the effort."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +134,7 @@ def run_checks(
     algorithm = replace(task.algorithm, num_mini_batches=1)  # a few robots allow no more
     env_cfg = replace(task.env, num_envs=NUM_ENVS, num_threads=1)
     try:
-        env = make_env(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
+        make_env(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
         still_env = make_env(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
         return make_result(robot.spec.name, Check(name, False, str(error), expected))
@@ -151,13 +143,11 @@ def run_checks(
     checks = (
         Check(name, True, f"{NUM_ENVS} robots", expected),
         check_spawn_height(still_env),
-        *check_observations(env),
         check_stand(still_env),
-        check_standing(still_env),
-        check_action_scale(still_env),
         check_step_responses(still_env),
-        *check_rewards(env, trained.last_rewards if trained else {}),
+        *check_rules(task, robot),
         *([check_training(record)] if record else []),
+        *(check_penalties(trained.last_rewards) if trained else []),
         *(check_trends(trained) if trained else []),
     )
     return make_result(robot.spec.name, *checks)
@@ -192,15 +182,6 @@ def check_spawn_height(env: LeggedEnv) -> Check:
     return Check("spawn height", bool(passed), above, expected)
 
 
-def check_observations(env: LeggedEnv) -> Iterator[Check]:
-    """Check that each observation group is finite."""
-    for name, obs in env.get_observations().items():
-        finite = bool(torch.isfinite(obs).all())
-        measured = f"{obs.shape[1]} numbers{'' if finite else ', some not finite'}"
-        expected = f"finite numbers ({len(env.obs_terms[name])} terms, {env.num_actions} joints)"
-        yield Check(f"observation {name}", finite, measured, expected)
-
-
 def check_stand(env: LeggedEnv) -> Check:
     """Check that the robots stand for one second with zero action, on two legs for half of it."""
     seconds = 0.5 if len(env.robot.spec.feet) == 2 else 1.0  # without balance, a biped tips over
@@ -218,30 +199,6 @@ def check_stand(env: LeggedEnv) -> Check:
     return Check(STAND, passed, measured, expected)
 
 
-def check_standing(env: LeggedEnv) -> Check:
-    """Check that a robot that stands still earns little of the tracking rewards."""
-    env.reset()
-    walking = replace(env.cfg.commands, standing=0.0)
-    env.set_commands(sample_commands(env.rng, env.num_envs, walking)[0])
-    terms = [term for name, term in env.active_rewards.items() if name.startswith("tracking_")]
-    earned = np.zeros(env.num_envs)
-    for function, scale in terms:
-        earned += scale * function(env)
-    most = sum(scale for _, scale in terms) or 1.0
-    share = float(np.max(earned[is_moving(env.commands)], initial=0)) / most
-    expected = f"at most {MAX_STANDING:.0%} of the tracking rewards at any command"
-    return Check("standing is not tracking", share <= MAX_STANDING, f"{share:.0%}", expected)
-
-
-def check_action_scale(env: LeggedEnv) -> Check:
-    """Check that an action of 1 is within the effort of each joint."""
-    torque = env.actions.scale * env.scene.model.actuator_gainprm[:, 0] / env.robot.effort
-    worst = int(torque.argmax())
-    measured = f"{torque[worst]:.2g} of the effort of {env.robot.spec.joint_order[worst]}"
-    expected = f"at most {MAX_ACTION_TORQUE:g}; action_scale in robot.toml is the factor"
-    return Check("action scale", bool(torque[worst] <= MAX_ACTION_TORQUE), measured, expected)
-
-
 def check_step_responses(env: LeggedEnv) -> Check:
     """Check that each joint that the policy moves follows a step of its target."""
     order = env.robot.spec.joint_order
@@ -253,54 +210,33 @@ def check_step_responses(env: LeggedEnv) -> Check:
     return Check("joints follow their targets", not failed, measured, expected)
 
 
-def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Check]:
-    """Check that each reward is finite, and not zero in all states of a rollout and random ones.
+def check_rules(task: Task, robot: Robot) -> Iterator[Check]:
+    """Check the task with the rules of check-task. Notes do not fail."""
+    host = TerrainkitHost(PolicySpec(task=task, robot=robot), Plane(), Path(robot.spec.name))
+    report = check_task(host)
+    found = group((f.code, f.message) for f in report.findings if f.severity != "note")
+    skipped = {skip.code for skip in report.skipped}
+    for rule in rules("task"):
+        messages = found.get(rule.code, [])
+        measured, name = "; ".join(messages) or "nothing found", f"{rule.code} {rule.name}"
+        if rule.code not in skipped:
+            yield Check(name, not messages, measured, rule.page.how_to_fix)
 
-    No penalty of `trained`, mean rewards in a training [1/s], may be far larger than the positive
-    rewards, or robots learn to fall. `termination` may: it depends on how often they still fall.
+
+def check_penalties(rewards: Mapping[str, float]) -> Iterator[Check]:
+    """Check that no penalty is far larger than the positive rewards, or robots learn to fall.
+
+    `termination` may be: it depends on how often they still fall.
+
+    Args:
+        rewards: Mean of each term at the end of a training [1/s].
     """
-    positive = sum(max(value, 0) for value in trained.values())
-    commands = env.commands.copy()
-    commands[::4] = 0  # for the rewards of standing robots
-    env.set_commands(commands)
-    values: dict[str, list[Any]] = {name: [] for name in env.active_rewards}
-    generator = torch.Generator().manual_seed(env.cfg.runner.seed)
-    for _ in range(RANDOM_STEPS):
-        env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
-        for name, (reward, _) in env.active_rewards.items():
-            values[name].append(reward(env))
-    env.set_commands(None)
-    env.state = random_state(env.state, env.cfg.runner.seed)
-    for name, (reward, _) in env.active_rewards.items():
-        low, high = np.min(values[name]), np.max(values[name])
-        passed = bool(np.isfinite([low, high]).all())
-        measured = f"{low:.3g} to {high:.3g}"
-        if not passed:
-            measured = "not finite"
-        elif name == "dof_pos_limits" and not np.isfinite(env.robot.lower).any():
-            measured = "0: no joint has soft limits"
-        elif low == 0 == high:
-            passed = bool(reward(env).any())
-            measured = "0: the rewarded event did not happen" if passed else "0 in every state"
-        expected = f"finite, and not 0 in every state; rewards.{name} 0 disables it"
-        if name in trained:
-            share = trained[name] / (positive or 1.0)
-            measured += f"; trained {trained[name]:+.3f} /s, {share:.0%} of the positive rewards"
-            passed &= name == "termination" or share >= -MAX_PENALTY
-            expected += f"; a penalty of at most {MAX_PENALTY:.0%}"
-        yield Check(f"reward {name}", passed, measured, expected)
-
-
-def random_state(state: State, seed: int) -> State:
-    """Return random states, of magnitudes from 0.1 for the first robot to 1000 for the last."""
-    rng = np.random.default_rng(seed)
-    random = {}
-    for name, array in vars(state).items():
-        scale = np.logspace(-1, 3, len(array)).reshape(-1, *[1] * (array.ndim - 1))
-        values = scale * rng.normal(size=array.shape)
-        random[name] = values > 0 if array.dtype == bool else values.astype(array.dtype)
-    random["commands"][::4] = 0
-    return State(**random)
+    positive = sum(max(value, 0) for value in rewards.values()) or 1.0
+    for name, value in rewards.items():
+        if value < 0 and name != "termination":
+            measured = f"{value:+.3f} /s, {-value / positive:.0%} of the positive rewards"
+            passed = -value <= MAX_PENALTY * positive
+            yield Check(f"penalty {name}", passed, measured, f"at most {MAX_PENALTY:.0%}")
 
 
 def check_training(record: TrainingRecord) -> Check:

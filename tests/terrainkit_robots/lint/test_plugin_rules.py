@@ -75,7 +75,7 @@ def test_rule_of_another_package_runs(install, tmp_path):
         ("raise SystemExit(0)", "ACM", "SystemExit: 0"),
         (RULES, "INR", "family: got INR; expected three other capital letters"),
         (RULES, "acme", "family: got acme; expected three other capital letters"),
-        (RULES, "ACE", r"rule code: got ACM001; expected a family \(XML, .*DYN, ACE\) and three"),
+        (RULES, "ACE", r"rule code: got ACM001; expected a family \(XML, .*TSK, ACE\) and three"),
         (RULES.replace("ACM001", "INR099"), "ACM", "got INR099; expected ACM and digits"),
         (RULES.replace("ACM001", "INR001"), "ACM", r"rule code INR001: got acme_rules\.unlabeled"),
     ],

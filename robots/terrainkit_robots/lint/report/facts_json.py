@@ -8,6 +8,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.legs.legs import mean_length
 from terrainkit_robots.analysis.simulator_conventions.loaded_robot import loaded_robots
+from terrainkit_robots.analysis.task_facts import TaskFacts
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -18,8 +19,10 @@ _DIGITS = 6
 """Significant digits of each number."""
 
 
-def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
+def facts_json(facts: "Facts | TaskFacts", *, may_simulate: bool = False) -> dict[str, Any]:
     """Return the facts as a JSON-compatible dictionary, in SI units and radians.
+
+    Those of a task are its rewards by behavior.
 
     All robots have the same keys. Unknown values are None. `observation_size` is the size for a
     legged_gym policy without height scan: 12 values for velocities, gravity and command, and
@@ -33,6 +36,8 @@ def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
         facts: The robot.
         may_simulate: Whether to compute `suggested_gains`, which requires a MuJoCo model.
     """
+    if isinstance(facts, TaskFacts):
+        return facts.to_json()
     legs, actuated = facts.legs, len(facts.actuated)
     return {
         "name": facts.model.name,

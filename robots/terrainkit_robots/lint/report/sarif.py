@@ -9,7 +9,7 @@ from urllib.parse import quote_from_bytes
 from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
-from terrainkit_robots.lint.rule import Finding, Rule, families, rules
+from terrainkit_robots.lint.rule import TASK_FAMILIES, Finding, Rule, families, rules
 from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.text import display_path
 
@@ -30,7 +30,9 @@ def to_text(reports: Sequence[Report]) -> str:
 def _run(reports: Sequence[Report]) -> dict[str, Any]:
     from terrainkit import __version__
 
-    index = {rule.code: place for place, rule in enumerate(rules())}
+    is_task = bool(reports) and reports[0].facts.model.kind == "task"
+    listed = rules("task" if is_task else "robot")
+    index = {rule.code: place for place, rule in enumerate(listed)}
     results: list[dict[str, Any]] = []
     notifications: list[dict[str, Any]] = []
     for report in reports:
@@ -43,7 +45,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
                 results.append({**_result(skipped.finding, index), "suppressions": [source]})
             else:
                 notifications.append(_notification(skipped, report.facts.model.file))
-    driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in rules()]}
+    driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in listed]}
     invocation = {"executionSuccessful": True, "toolExecutionNotifications": notifications}
     return {
         "tool": {"driver": driver},
@@ -60,6 +62,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
 
 def _rule(rule: Rule) -> dict[str, Any]:
     title, why, how_to_fix, reference = rule.page
+    subject = "task" if rule.family in TASK_FAMILIES else "robot"
     paragraphs = (why, f"How to fix: {how_to_fix}", f"Source: {reference}")
     return {
         "id": rule.code,
@@ -68,7 +71,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "fullDescription": {"text": why},
         "help": {"text": "\n\n".join(paragraphs)},
         "defaultConfiguration": {"level": rule.severity},
-        "properties": {"tags": ["robot", families()[rule.family].title], "fixes": rule.fixes},
+        "properties": {"tags": [subject, families()[rule.family].title], "fixes": rule.fixes},
     }
 
 

@@ -79,8 +79,9 @@ def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
     model = report.facts.model
     file = escape_control(display_path(model.file))
     yield (Span(file, "bold"),)
-    # There is nothing to summarize if the file contains no robot.
-    for label, text in robot_summary(report) if model.links or not model.problems else ():
+    # There is nothing to summarize if the file contains no robot. A task has a table of its own.
+    has_robot = model.kind != "task" and (model.links or not model.problems)
+    for label, text in robot_summary(report) if has_robot else ():
         first = f"  {label:<9} "
         yield from _wrap(Span(first, "dim"), escape_control(text), width, indent=len(first))
     yield ()

@@ -1,0 +1,1 @@
+"""Hosts of tasks: one adapter for each framework whose environments are checked."""
