@@ -140,4 +140,4 @@ def test_onboard_without_opengl_skips_pictures(tmp_path):
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stderr) == (0, "")
-    assert "pictures  none: MuJoCo cannot render here (nonsense: " in run.stdout
+    assert "pictures  none of the robot: MuJoCo cannot render here (nonsense: " in run.stdout

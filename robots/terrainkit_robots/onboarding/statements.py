@@ -105,8 +105,8 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
     yield Statement("next", _commands(result, robot))
     yield from _configs(result)
     pictures = f"{count(len(result.images), 'picture')} in report.md"
-    if not result.images:
-        pictures = f"none: {result.images_error}"
+    if result.images_error:
+        pictures = f"none{' of the robot' if result.images else ''}: {result.images_error}"
     yield Statement("pictures", _pictures(result), "pictures", pictures)
     if result.edits:
         edits = names(result.edits)

@@ -78,6 +78,7 @@ def test_summary_lists_what_else_happened(lines):
         configs={"mjlab": ("a.py", "b.py"), "isaaclab": ("c.py",)},
         skipped_configs={"legged_gym": "it has no legs"},
         images=("a.png",),
+        images_error="",
         edits=("robot.toml.bak",),
         changes=("renamed it",),
         missing=1,
