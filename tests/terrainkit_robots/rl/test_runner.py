@@ -134,7 +134,7 @@ def test_noise_is_limited_from_the_middle_to_the_last_quarter(make, task):
     largest = []
 
     def record(runner):
-        largest.append(float(runner.alg.get_policy().distribution.std_param.max()))
+        largest.append(float(runner.alg.get_policy().distribution.std_param.detach().max()))
 
     make(limited, progress_callback=record).learn(8)
     assert min(largest[:4]) > 0.5

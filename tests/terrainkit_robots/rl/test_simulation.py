@@ -161,7 +161,7 @@ def test_memory_estimate_matches_measurement(quadruped, monkeypatch):
         "terrainkit_robots.rl.simulation.check_memory", lambda each, *_: needed.append(each)
     )
     task = Task(env=Env(num_envs=1000), runner=Runner(num_steps_per_env=12))
-    check_env_memory(task, quadruped, scan=True, history=0, ngeom=50)
+    check_env_memory(task, quadruped, points=187, history=0, ngeom=50)
     assert 0.7 < needed[0] / 1000 / float(run.stdout) < 2.0
 
 
@@ -170,9 +170,9 @@ def test_check_env_memory_names_the_setting(quadruped, monkeypatch):
     task = Task(env=Env(num_envs=40_000), algorithm=Algorithm(symmetry=False))
     message = r"training with env\.num_envs 40000, 0\.\d+ MB each, needs .* GB of memory"
     with pytest.raises(MemoryLimitError, match=message) as caught:
-        check_env_memory(task, quadruped, scan=False, history=0, ngeom=50)
+        check_env_memory(task, quadruped, points=0, history=0, ngeom=50)
     (hint,) = re.findall(r"env\.num_envs (\d+) would fit$", str(caught.value))
     assert int(hint) > 5000
     check_env_memory(
-        replace(task, env=Env(num_envs=int(hint))), quadruped, scan=False, history=0, ngeom=50
+        replace(task, env=Env(num_envs=int(hint))), quadruped, points=0, history=0, ngeom=50
     )
