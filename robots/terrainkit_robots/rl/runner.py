@@ -223,6 +223,8 @@ class LeggedRunner(OnPolicyRunner):
             expected = "expected none for a network without `std_param`"
             raise ConfigError(f"policy.final_noise_std: got {policy.final_noise_std:g}; {expected}")
         quarters = 4 * iteration / self.env.cfg.runner.max_iterations
+        if quarters <= 2:
+            return
         limit = np.interp(quarters, [2, 3], [policy.init_noise_std, policy.final_noise_std])
         noise.data.clamp_(max=float(limit))
 
