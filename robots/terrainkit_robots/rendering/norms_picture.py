@@ -45,7 +45,7 @@ def draw_norms(robot: Facts, gains: Mapping[str, tuple[float, float]] | None = N
         cv2.putText(image, text, (x, y + 16), font, 0.42, color, 1, cv2.LINE_AA)
 
     write(f"{robot.model.title} among published robots", _MARGIN, _MARGIN)
-    write("90 % of the robots", _LEFT + 50, _MARGIN, _GRAY)
+    write("90 % of the robots" if keys else "nothing to compare", _LEFT + 50, _MARGIN, _GRAY)
     before = ""
     for number, (quantity, role) in enumerate(keys, 2):
         norm, values = norms()[quantity, role], rows[quantity, role]

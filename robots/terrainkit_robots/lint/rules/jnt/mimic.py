@@ -65,10 +65,11 @@ def _outside_limits(joint: Joint, target: Joint, mimic: Mimic) -> Violations:
         return
     low, high = sorted(mimic.multiplier * end + mimic.offset for end in other)
     excess = max(own[0] - low, high - own[1])
+    inside = max(0.0, min(own[1], high) - max(own[0], low))
     if excess > _MAX_EXCESS * (high - low):
         yield Violation(
             element=Part(joint.name, mimic.source),
-            severity="warning" if excess > (high - low) / 2 else "note",
+            severity="warning" if inside < (high - low) / 2 else "note",
             message=f"positions of joint {joint.name}, which follows {target.name}: got {low:.4g} "
             f"to {high:.4g} {joint.unit}; expected positions within its limits of {own[0]:.4g} to "
             f"{own[1]:.4g} {joint.unit}",

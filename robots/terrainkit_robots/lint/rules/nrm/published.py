@@ -55,7 +55,7 @@ def _unusual(
         count = fewer if is_large else norm.robots - fewer
         what, unit = QUANTITIES[quantity]
         unit = unit and f" {unit}"
-        others = f"; so are {len(values) - 1} more links or joints" if len(values) > 1 else ""
+        others = {sample.element.name for _, sample in values} - {worst.element.name}
         is_far = excess > (above if is_large else below) and worst.role != "other"
         yield Violation(
             element=worst.element,
@@ -63,7 +63,8 @@ def _unusual(
             message=f"{what} of {worst.role} {worst.element.name}: got {worst.value:.3g}{unit}, "
             f"{'more' if is_large else 'less'} than in {count} of {norm.robots} published robots; "
             f"expected at {'most' if is_large else 'least'} {norm.limits[is_large]:.3g}{unit} "
-            f"(median {norm.median:.3g}){others}",
+            f"(median {norm.median:.3g})"
+            + (f"; it is unusual for {len(others)} more" if others else ""),
             measured={"value": worst.value, "median": norm.median, "robots": count},
         )
 

@@ -172,7 +172,8 @@ def keyframe_outside_limits(robot: Facts) -> Violations:
         keys, outside = np.nonzero(excess > np.minimum(_TOLERANCE, _MAX_SHARE * (high - low)))
         if len(keys):
             key, column = int(keys[0]), int(outside[0])
-            name = getattr(model, kind)(int(indices[column])).name
+            index = int(indices[column])
+            name = getattr(model, kind)(index).name or str(index + 1)
             yield Violation(
                 element=Part(name, robot.model.source),
                 message=f"{field} of {kind} {name} in keyframe {model.key(key).name or key + 1}: "

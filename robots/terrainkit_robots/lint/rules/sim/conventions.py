@@ -16,7 +16,7 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.jnt.joint_limits import joints_without_zero
 from terrainkit_robots.text import conjunction, names
 
@@ -55,7 +55,9 @@ def simulator_defaults(robot: Facts) -> Violations:
         published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
         marked as unverified. Inertias are those of all links below a joint, all joints at 0.
     """
-    parts = [*_order(robot), *_feet(robot), *_trunk(robot), *_armature(robot)]
+    parts = [*_order(robot), *_feet(robot), *_trunk(robot)]
+    if not any(findings_of(robot, "UNI001", "UNI002", "UNI003")):  # else, inertias say nothing
+        parts += _armature(robot)
     if robot.legs and (joints := joints_without_zero(robot)):
         listed = names((joint.name for joint in joints), 4)
         parts.append(f"joints start at 0, which is outside of the limits of {listed}")
