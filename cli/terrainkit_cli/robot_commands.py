@@ -130,8 +130,9 @@ class CheckRobot(Command):
         if len(files) > 1 and (self.against or self.spec or self.feet or self.picture):
             options = "--against, --spec, --feet and --picture"
             raise ConfigError(f"{options}: got {len(files)} files; expected one")
-        for output in filter(None, (self.output, self.picture)):
-            _check_output(output, [Path(name) for name in files])
+        inputs = [Path(name) for name in files]
+        _check_output("--output", self.output, inputs)
+        _check_output("--picture", self.picture, [*inputs, *filter(None, [self.output])])
         baseline = self._read_baseline()
         results = [result for name in files if (result := self._check_file(name, settings))]
         if self.write_baseline:
@@ -269,7 +270,9 @@ class CheckRobot(Command):
         elif reports:
             from terrainkit.files.atomic_write import atomic_write
 
-            _check_output(self.output, [path for r in reports for path in r.facts.model.sources])
+            _check_output(
+                "--output", self.output, [path for r in reports for path in r.facts.model.sources]
+            )
             with atomic_write(self.output, overwrite=True) as path:
                 path.write_bytes(text.encode("utf-8", "backslashreplace"))
             render.result(f"wrote {self.output}: {summarize_findings(reports)}")
@@ -300,14 +303,17 @@ def _is_folder(name: str) -> bool:
     return name not in ("", *bundled.robot_names()) and is_folder(Path(name))
 
 
-def _check_output(output: Path, inputs: Sequence[Path]) -> None:
-    """Raise an error if the report cannot be written, or would replace a checked file."""
+def _check_output(name: str, output: Path | None, others: Sequence[Path]) -> None:
+    """Raise an error if an output cannot be written, or would replace another file."""
     from terrainkit.files.atomic_write import check_target
 
+    if output is None:
+        return
     check_target(output, overwrite=True)
-    for path in inputs:
-        if output.exists() and path.exists() and output.samefile(path):
-            raise ConfigError(f"--output {output} would replace the checked file {path}")
+    for path in others:
+        is_link = output.exists() and path.exists() and output.samefile(path)
+        if is_link or output.resolve() == path.resolve():
+            raise ConfigError(f"{name} {output} would replace {path}; expected another file")
 
 
 @dataclass(frozen=True, kw_only=True)

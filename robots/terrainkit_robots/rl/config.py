@@ -78,7 +78,8 @@ class Terrain(Config):
     """Points of the height scan to the left of the robot [m]."""
     # Cells of 0.1 m show an edge to 5 cm, too little to place a foot on a stone of 25 cm.
     foot_points_x: tuple[float, ...] = ()
-    """More points of the height scan, ahead of the default position of each foot [m]."""
+    """More points of the height scan: of a grid around the default position of each foot, ahead of
+    it [m]."""
     foot_points_y: tuple[float, ...] = ()
     """The same to the left [m]."""
     # A policy that saw no deep holes in training stops before them: with a 10 cm gap, 0 of 8 robots
@@ -570,6 +571,11 @@ class Task(Config):
         if (delay := self.domain_rand.action_delay) and not self.sim.dt / 2 < delay[1] <= 1:
             expected = f"expected an end above half of sim.dt {self.sim.dt:g}, at most 1 s; or none"
             raise ConfigError(f"domain_rand.action_delay: got {list(delay)}; {expected}")
+        if bool(self.terrain.foot_points_x) != bool(self.terrain.foot_points_y):
+            raise ConfigError(
+                "terrain.foot_points_x, foot_points_y: got only one of them; expected both, since "
+                "the points are a grid around each foot"
+            )
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:
             got = f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}"

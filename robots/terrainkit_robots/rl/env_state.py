@@ -68,7 +68,7 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
     if num_envs != env.num_envs and num_envs == len(saved["sim.episode_length"]):
         check_state("env.arrays", saved, {name: own["arrays"][name] for name in _SHARED})
         _copy_arrays(env, saved, _SHARED)
-        if isinstance(env.terrain, StreamGround):  # no patch comes twice
+        if isinstance(env.terrain, StreamGround) and "stream.episodes" in saved:  # none comes twice
             env.terrain.skip(int(saved["stream.episodes"].max()))
         env.reset()
         return

@@ -78,9 +78,15 @@ class StreamGround(Ground):
         self._collision: Collision = "boxes" if task.terrain.collision == "boxes" else "hfield"
         _require_supported(sample)
         cell, number = sample.config.cell, task.env.num_envs
-        points = task.terrain.measured_points_x, task.terrain.measured_points_y
-        reach = math.hypot(*(max(map(abs, values)) for values in points))
-        margin = math.ceil((_LEAVE + max(reach, _REACH)) / cell)
+        terrain = task.terrain
+        points = terrain.measured_points_x, terrain.measured_points_y
+        near = (0.0, *terrain.foot_points_x), (0.0, *terrain.foot_points_y)
+        # A foot reaches as far as the ground is measured, and its points are around it.
+        reach = max(
+            math.hypot(*(max(map(abs, values)) for values in points)),
+            _REACH + math.hypot(*(max(map(abs, values)) for values in near)),
+        )
+        margin = math.ceil((_LEAVE + reach) / cell)
         config = replace(
             sample.config,
             border=margin * cell,
@@ -269,7 +275,9 @@ def _require_supported(terrain_map: TerrainMap) -> None:
     friction = np.float32(terrain_map.config.static_friction)
     has_frictions = (terrain_map.friction != friction).any()
     if has_frictions or not np.isnan(terrain_map.solids.friction).all():
-        raise ConfigError("terrain.stream: got several frictions; expected that of the map")
+        raise ConfigError(
+            "terrain.stream: got several frictions; expected one, such as without friction_patches"
+        )
     if len(terrain_map.solids.hull_counts):
         names = listing(dict.fromkeys(terrain_map.terrain_names))
-        raise ConfigError(f"terrain.stream: got hulls on a map of {names}; expected none")
+        raise ConfigError(f"terrain.stream: got hulls on a map of {names}; expected other terrains")

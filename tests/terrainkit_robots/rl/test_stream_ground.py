@@ -125,7 +125,7 @@ def test_what_cannot_change_is_rejected(nominal_task):
         StreamGround(Plane(), task)
     for values, told in (
         ({"terrain": "rocks"}, "got hulls on a map of rocks"),
-        ({"terrain": "flat", "friction": 0.5}, "got several frictions; expected that of the map"),
+        ({"terrain": "flat", "friction": 0.5}, "got several frictions; expected one"),
     ):
         terrains = (SubTerrain(**values),)
         config = MapConfig(rows=1, cols=1, border=1.0, terrains=terrains)
