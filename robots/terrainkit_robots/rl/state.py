@@ -94,6 +94,18 @@ def scan_points(cfg: Terrain, foot_pos: FloatArray) -> FloatArray:
     return np.concatenate([grid, around.reshape(-1, 2)])
 
 
+def next_air_time(last: State, in_air: NDArray[np.bool_], dt: np.float32) -> FloatArray:
+    """Return the `foot_air_time` of the step after a state.
+
+    Args:
+        last: State before the step.
+        in_air: Whether each foot is in the air after it, shape (n, f).
+        dt: Time of the step [s].
+    """
+    before = np.where(last.foot_contact, 0, last.foot_air_time)
+    return (before + dt) * (in_air | (before > 0))  # also when the foot lands
+
+
 class Sensors:
     """Measure n robots."""
 
@@ -159,9 +171,7 @@ class Sensors:
             foot_force[:] = penalized[:] = torques[:] = 0
         else:
             last_vel, dof_acc = last.mean_vel, (dof_vel - last.dof_vel) / dt
-            before = np.where(last.foot_contact, 0, last.foot_air_time)
-            in_air = foot_force[..., 2] <= CONTACT_FORCE
-            air_time = (before + dt) * (in_air | (before > 0))  # also when the foot lands
+            air_time = next_air_time(last, foot_force[..., 2] <= CONTACT_FORCE, dt)
         return {
             "base_pos": pos,
             "base_quat": quat,

@@ -14,7 +14,7 @@ from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.env import make_env
 from terrainkit_robots.rl.rewards import target_swing_height
 from terrainkit_robots.rl.run import PolicySpec
-from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.state import State, next_air_time
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.task_check.host import Array, Host, Motion, Step
 
@@ -128,8 +128,7 @@ class TerrainkitHost(Host):
         # A foot that stands for half of the time swings at twice the velocity of the base.
         state.foot_vel[:] *= np.where(stance, 0, 2)[..., None]
         state.foot_ground_depth[:] = 0
-        before = np.where(last.foot_contact, 0, last.foot_air_time)
-        state.foot_air_time[:] = (before + self.dt) * (~stance | (before > 0))
+        state.foot_air_time[:] = next_air_time(last, ~stance, np.float32(self.dt))
         state.mean_vel[:, :2] = state.base_lin_vel[:, :2]
         state.mean_vel[:, 2] = state.base_ang_vel[:, 2]
         state.torques[:] = 0
