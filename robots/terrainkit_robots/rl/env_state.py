@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.events import apply_params
-from terrainkit_robots.rl.stream_ground import StreamGround
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv
@@ -25,10 +24,8 @@ def env_arrays(env: "LeggedEnv") -> dict[str, NDArray[Any]]:
         "sim": {"physics": env.sim.batch.state, "episode_length": env.episode_length_buf.numpy()},
         "rewards": env.episode_sums,
         "buffers": env.buffers,
+        "stream": env.terrain.arrays,
     }
-    if isinstance(env.terrain, StreamGround):
-        names = ("episodes", "types", "difficulties")
-        tables["stream"] = {name: getattr(env.terrain, name) for name in names}
     if env.cfg.domain_rand.action_delay:
         tables["delay"] = {"actions": env.sim.batch.expand("actuator_delay")}
     # The state has means, accelerations and forces, which cannot be computed from the physics.
@@ -68,7 +65,7 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
     if num_envs != env.num_envs and num_envs == len(saved["sim.episode_length"]):
         check_state("env.arrays", saved, {name: own["arrays"][name] for name in _SHARED})
         _copy_arrays(env, saved, _SHARED)
-        if isinstance(env.terrain, StreamGround) and "stream.episodes" in saved:  # none comes twice
+        if "stream.episodes" in saved:  # no patch comes twice
             env.terrain.skip(int(saved["stream.episodes"].max()))
         env.reset()
         return
@@ -81,8 +78,7 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
         if name.startswith("buffers.") and name not in own["arrays"]:
             env.buffers[name.removeprefix("buffers.")] = torch.clone(array).numpy()
     _copy_arrays(env, saved, own["arrays"])
-    if isinstance(env.terrain, StreamGround):
-        env.terrain.restore()
+    env.terrain.restore()
     if env.waypoints and (env.waypoints.index > env.waypoints.numbers).any():
         largest = env.waypoints.index.max()
         raise ConfigError(f"next goal: got {largest}; expected no more than the robot has")

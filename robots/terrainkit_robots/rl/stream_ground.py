@@ -132,6 +132,8 @@ class StreamGround(Ground):
         self.goals = np.zeros((number, 1, 2 * sample.goals.shape[2], 4), np.float32)
         self.episodes, self.types = np.zeros((2, number), np.int64)
         self.difficulties = np.zeros(number)
+        names = ("episodes", "types", "difficulties")
+        self.arrays = {name: getattr(self, name) for name in names}
         self._geoms: PatchGeoms | None = None
         self._elevation: NDArray[np.float32] | None = None
 

@@ -1,7 +1,9 @@
 """The terrain under the robots: its MuJoCo model, its heights, and its spawn origins."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -35,6 +37,7 @@ class Ground(ABC):
     ends_at_bounds: bool = False  # whether an episode that leaves it ends as at its time limit
     surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
     is_plane: bool  # an infinite plane, without patches: a height scan carries no information
+    arrays: Mapping[str, NDArray[Any]] = MappingProxyType({})  # that change, for a checkpoint
 
     @abstractmethod
     def spec(self) -> Any:
@@ -58,6 +61,12 @@ class Ground(ABC):
         self, env_ids: Ids, levels: Ids, columns: Ids, rng: np.random.Generator
     ) -> None:
         """Change the ground of robots whose episodes start, shape (k,); see `StreamGround`."""
+
+    def restore(self) -> None:  # noqa: B027
+        """Change the ground as `arrays` say, which were replaced by those of a checkpoint."""
+
+    def skip(self, episodes: Any) -> None:  # noqa: B027
+        """Continue after a number of patches, one number or shape (n,)."""
 
     def places(self, levels: Ids, columns: Ids) -> tuple[Ids, Ids]:
         """Return the indices into `spawns` and `goals` of robots on these patches, shape (n,)."""
