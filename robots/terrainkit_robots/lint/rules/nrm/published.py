@@ -47,7 +47,11 @@ def _unusual(
             if excess > 1:
                 found.append(((sample.quantity, sample.value > high), (excess, sample)))
     reported = {f.subject for f in findings_of(robot, *explained)} if found else set()
-    unexplained = [each for each in found if each[1][1].element.name not in reported]
+    unexplained = (
+        (kind, (excess, sample))
+        for kind, (excess, sample) in found
+        if sample.element.name not in reported
+    )
     for (quantity, is_large), values in group(unexplained).items():
         excess, worst = max(values, key=lambda value: (value[1].role != "other", value[0]))
         norm = norms()[quantity, worst.role]
