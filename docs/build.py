@@ -10,6 +10,7 @@ import ast
 import dataclasses
 import importlib
 import inspect
+import json
 import os
 import pkgutil
 import re
@@ -21,6 +22,7 @@ from io import StringIO
 from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import cv2
 import numpy as np
@@ -61,6 +63,7 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
+RESULT_FILES = DOCS.parent / "benchmarks" / "results" / "policies"
 NOTE = "<!-- Written by docs/build.py: change the docstrings, not this file. -->\n"
 SEED = 3
 
@@ -355,6 +358,43 @@ def help_of(arguments: list[str]) -> str:
     command = [sys.executable, "-m", "terrainkit_cli.main", *arguments, "--help"]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     return "\n".join(line.rstrip() for line in run.stdout.strip().splitlines())
+
+
+def results_page() -> str:
+    parts = ["# Policies on the suites\n", NOTE, RESULTS]
+    cards = [json.loads(path.read_text()) for path in sorted(RESULT_FILES.glob("*.json"))]
+    for suite, group in groupby(sorted(cards, key=suite_and_success), lambda card: card["map"]):
+        rows = list(group)
+        tests = [test["name"] for test in rows[0]["tests"]]
+        parts.append(f"\n## {suite}\n\nThe share of the attempts that crossed, in percent:\n")
+        header = ["policy", "speed [m/s]", "all tests", *tests]
+        parts += ["| " + " | ".join(header) + " |", "|---" * len(header) + "|"]
+        for card in rows:
+            low, high = card["interval"]
+            total = f"{100 * card['success']:.0f} ({100 * low:.0f} to {100 * high:.0f})"
+            shares = [f"{100 * test['success']:.0f}" for test in card["tests"]]
+            cells = [f"{card['policy']}: {card['source']}", f"{card['speed']:.2f}", total, *shares]
+            parts.append("| " + " | ".join(cells) + " |")
+    return "\n".join(parts) + "\n"
+
+
+def suite_and_success(card: dict[str, Any]) -> tuple[str, float, str]:
+    """Return the key by which results are sorted: by suite, the most successful first."""
+    return card["map"], -card["success"], card["policy"]
+
+
+RESULTS = """Results of `terrainkit evaluate --suite`, one JSON file each in
+[benchmarks/results/policies](../benchmarks/results/policies). To add yours:
+
+```sh
+terrainkit evaluate quadruped --suite home-1 -o card   # or --policy FILE.onnx --robot ROBOT
+```
+
+Copy `card.json` to `benchmarks/results/policies/NAME-SUITE.json`, add the keys `policy` (its name),
+`source` (where it is published) and `terrainkit` (the version), and run `python docs/build.py`. A
+test compares the hash of the suite and recomputes the shares and the intervals, which are Wilson's
+at 95 %. The attempts are at three quarters of the largest forward command of the policy.
+"""
 
 
 def examples_page() -> str:
@@ -679,6 +719,7 @@ def main() -> int:
         "legged_gym_names.md": names_page(),
         "cli.md": cli_page(),
         "examples.md": examples_page(),
+        "policy_results.md": results_page(),
         "llms.txt": llms_text(),
         **{f"schemas/{name}.json": config_schema(kind) for name, kind in SCHEMAS.items()},
         **api_pages(),
