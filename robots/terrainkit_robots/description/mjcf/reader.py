@@ -63,9 +63,6 @@ from terrainkit_robots.text import UniqueNames, count, names
 if TYPE_CHECKING:
     import mujoco
 
-_PAIRED = 1 << 30
-"""Contype bit of geoms that collide only through a <pair>; no other geom uses it."""
-
 
 def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
     """Return the robot of a document whose root is <mujoco>.
@@ -107,6 +104,10 @@ class _SpecReader:
         self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
         self._materials = {material.name: material for material in spec.materials}
         self._paired = {name for p in spec.pairs for name in (p.geomname1, p.geomname2)} - {""}
+        # Contype of geoms that collide only through a <pair>: the lowest bit that collides with no
+        # geom of the robot. If it is the first one, they stand on a floor with the default bits.
+        taken = {k for k in range(31) for geom in spec.geoms if geom.conaffinity >> k & 1}
+        self._paired_bit = 1 << min({*range(31)} - taken, default=30)
         self._bodies = UniqueNames(body.name for body in spec.bodies)
         self._joints = UniqueNames(joint.name for joint in spec.joints)
         new_body = mujoco.MjSpec().worldbody.add_body()
@@ -306,7 +307,7 @@ class _SpecReader:
         if self._spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
             return 0, 0
         if geom.name in self._paired and not (geom.contype or geom.conaffinity):
-            return _PAIRED, 0
+            return self._paired_bit, 0
         return int(geom.contype), int(geom.conaffinity)
 
     # Joints

@@ -147,7 +147,7 @@ def test_geom_without_contacts_is_visual():
         "drawn": (0, 0, False),
         "first": (0, 1, True),
         "other": (1, 0, True),
-        "paired": (1 << 30, 0, True),
+        "paired": (2, 0, True),  # the lowest bit that no geom's conaffinity has
         "both": (6, 5, True),
     }
     assert [len(each) for each in (a.visuals, b.visuals)] == [1, 0]
