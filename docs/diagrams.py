@@ -190,7 +190,7 @@ def draw_steps(path: Path) -> None:
     steps = (
         ("1 check-robot", "findings, fixes", "my_robot.urdf"),
         ("2 onboard", "pose, gains, feet", "my_robot/"),
-        ("3 smoke-test", "does it stand?", ""),
+        ("3 check-task", "what pays?", ""),
         ("4 train", "plane, then map", "run/"),
         ("5 evaluate, play", "errors, falls, video", ""),
         ("6 export", "ONNX, JSON", "policy/"),

@@ -38,7 +38,6 @@ COMMAND_GROUPS = {
         "rule": "Explain a rule of check-robot or check-task, or list all rules.",
         "onboard": "Convert a robot file into a folder that is ready for training.",
         "check-task": "Measure what a task pays for before it is trained.",
-        "smoke-test": "Check in a minute whether a robot can be trained.",
         "train": "Train a policy for a robot on a terrain, and save it as a run.",
         "evaluate": "Measure velocity errors, gait, falls and success of a policy.",
         "play": "Record a video of a policy, and print its errors and falls.",

@@ -73,6 +73,9 @@ def test_broken_environment_is_one_line(here, tmp_path, monkeypatch):
     [
         ("", "TASK: missing; expected a task, a run, an id, or --task FILE.py"),
         ("walker", "no task or robot folder 'walker'"),
+        ("a.urdf", "terrainkit onboard a.urdf makes a folder"),
+        ("quadruped --samples 49999", "--samples: got 49999; expected an integer >= 50000"),
+        ("Ant-v5 --samples 50000", "samples: got 50000 for a task of gymnasium; expected none"),
         ("Walker-v99", "Walker-v99: "),
         ("CartPole-v1", "CartPole-v1: got the space Discrete(2); expected a Box"),
         ("Ant-v5 --terrain plane", "--task, --terrain: got a value for gymnasium; expected none"),

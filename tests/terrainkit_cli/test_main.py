@@ -62,7 +62,7 @@ def test_jobs_that_do_not_fit_in_memory_are_rejected(rejected, monkeypatch):
     assert message in rejected("generate -o a.npz --jobs 9")
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "smoke-test"])
+@pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "check-task"])
 def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command):
     monkeypatch.setattr(training_extra, "PACKAGES", ("torch", "no_such_package"))
     told = "missing packages: no_such_package; run: pip install '.[train]' (in a clone of terra"

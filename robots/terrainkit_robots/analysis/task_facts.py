@@ -54,6 +54,25 @@ class Rollout:
         return np.asarray(self.rewards[self.running].sum(axis=0) / steps)
 
 
+class Training(NamedTuple):
+    """What a short training from scratch earned in its first and its last quarter."""
+
+    error: str = ""
+    """Why it stopped, in which case there is nothing else."""
+
+    terms: tuple[str, ...] = ()
+    """Names of the reward terms."""
+
+    rewards: NDArray[Any] = np.zeros((2, 0))
+    """Mean of each term in both quarters [1/s], shape (2, k)."""
+
+    falls: NDArray[Any] = np.zeros(2)
+    """Falls of a robot in both quarters [1/s], shape (2,)."""
+
+    robot_seconds: float = 1.0
+    """Time of all robots in a quarter [s]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskFacts:
     """What the rules of tasks read. A value that is None cannot be measured in the host."""
@@ -100,6 +119,12 @@ class TaskFacts:
 
     action_torque: NDArray[Any] | None = None
     """Torque of an action of 1 at the default pose, relative to the effort, shape (j,)."""
+
+    responses: Mapping[str, str] | None = None
+    """Why a joint does not follow a step of its target, by name; empty if it does."""
+
+    training: Training | None = None
+    """A short training, if one was asked for."""
 
     asymmetry: str | None = None
     """How left and right differ; empty if they are mirror images."""

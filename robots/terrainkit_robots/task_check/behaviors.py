@@ -1,13 +1,11 @@
 """Behaviors: short rollouts whose reward is known to be high or low before any training."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.task_facts import Rollout, TaskFacts, TaskModel
 from terrainkit_robots.description.fix import Source
-from terrainkit_robots.task_check.host import Array, Host, Motion, Step
+from terrainkit_robots.task_check.host import Array, Host, Motion, Progress, Step
 
 JOINT_SCATTER, SPEED_SCATTER, BASE_SCATTER = 0.5, 30.0, 3.0
 """Standard deviations of scattered positions [rad] and velocities [rad/s] of the joints, which
@@ -21,25 +19,28 @@ constant of its height [s]."""
 MOVED = "moving", "climbing", "stepping"
 """Behaviors without forces."""
 
-Progress = Callable[[str], object]
 
-
-def measure_task(host: Host, progress: Progress = lambda _: None) -> TaskFacts:
+def measure_task(
+    host: Host, progress: Progress = lambda _: None, samples: int | None = None
+) -> TaskFacts:
     """Return the facts of a task: a rollout of each behavior that its host supports.
 
     Args:
         host: The environment.
-        progress: Called with the name of each behavior.
+        progress: Called with a text at each behavior and each iteration of the training.
+        samples: Samples of a short training; None for none.
     """
     rollouts, missing = {}, dict(host.missing)
     for name in host.behaviors:
-        progress(name)
+        progress(f"behavior {name}")
         try:
             if name not in missing:
                 rollouts[name] = roll(host, name)
         except CannotCheckError as error:
             missing[name] = str(error)
     facts = dict(host.facts)
+    if samples:
+        facts["training"] = host.train(samples, progress)
     if "clearance" not in missing:
         host.reset("statue")
         facts["clearance"] = host.clearance()

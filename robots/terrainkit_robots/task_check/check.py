@@ -8,8 +8,8 @@ from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
 from terrainkit_robots.lint.check import select_rules
 from terrainkit_robots.lint.runner import Report, lint
 from terrainkit_robots.lint.settings import Settings
-from terrainkit_robots.task_check.behaviors import Progress, measure_task
-from terrainkit_robots.task_check.host import Host
+from terrainkit_robots.task_check.behaviors import measure_task
+from terrainkit_robots.task_check.host import Host, Progress
 
 HostName = Literal["terrainkit", "gymnasium", "mjlab"]
 
@@ -72,25 +72,30 @@ def _open_own(name: str, task_file: Path | None, terrain: str | None) -> Host:
 
 
 def check_task(
-    host: Host, settings: Settings | None = None, progress: Progress = lambda _: None
+    host: Host,
+    settings: Settings | None = None,
+    progress: Progress = lambda _: None,
+    samples: int | None = None,
 ) -> Report:
     """Return what the rules find in a task.
 
     Args:
         host: Its environment.
         settings: Selected and ignored rules.
-        progress: Called with the name of each behavior.
+        progress: Called with a text at each behavior and each iteration of the training.
+        samples: Samples of a short training; None for none. A host without a training takes none.
 
     Returns:
         The report. Its `facts` are the `TaskFacts`; rules that the host does not support are
         skipped, with the reason.
 
     Raises:
+        ConfigError: If the host has no training.
         PluginError: If the environment of another framework fails.
     """
     selected, ignored = select_rules(settings or Settings(), "task")
     foreign = str(host.file) if host.name != "terrainkit" else None
     with plugin_errors(foreign, TerrainkitError):
-        facts = measure_task(host, progress)
+        facts = measure_task(host, progress, samples)
     report = lint(facts, selected)
     return replace(report, skipped=(*report.skipped, *ignored))

@@ -1,6 +1,7 @@
 """What the behaviors need of an environment that MuJoCo simulates, in any framework."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,11 +9,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.task_facts import Training
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import lowest_point
 
 Array = NDArray[Any]
+Progress = Callable[[str], object]
 
 WEIGHTLESS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
 """Flags of MuJoCo with which a body keeps its velocity."""
@@ -105,6 +109,14 @@ class Host(ABC):
     def policy(self) -> Array:
         """Return the actions of the policy, shape (n, a)."""
         raise CannotCheckError("no policy was given")
+
+    def train(self, samples: int, progress: Progress) -> Training:  # noqa: ARG002
+        """Train a policy briefly; `progress` gets a text after each iteration.
+
+        Raises:
+            ConfigError: if the host has no training.
+        """
+        raise ConfigError(f"samples: got {samples} for a task of {self.name}; expected none")
 
     @property
     def height(self) -> int:

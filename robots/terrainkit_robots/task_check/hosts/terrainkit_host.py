@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import TerrainkitError
+from terrainkit_robots.analysis.task_facts import Training
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.rl.commands import sample_commands
@@ -16,7 +17,9 @@ from terrainkit_robots.rl.rewards import target_swing_height
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.state import State, next_air_time
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.task_check.host import Array, Host, Motion, Step
+from terrainkit_robots.simulation.step_response import step_responses
+from terrainkit_robots.task_check.host import Array, Host, Motion, Progress, Step
+from terrainkit_robots.task_check.short_training import train_briefly
 
 NUM_ENVS = 16
 """Number of robots."""
@@ -35,6 +38,7 @@ class TerrainkitHost(Host):
 
     def __init__(self, spec: PolicySpec, terrain: Ground, file: Path) -> None:
         super().__init__()
+        self._spec = spec
         task, robot, quiet = spec.task, spec.robot, eval_task(spec.task, NUM_ENVS)
         waypoints = task.commands.waypoints and not terrain.is_plane  # which has no goals
         env_cfg = replace(quiet.env, num_threads=1, episode_length_s=task.env.episode_length_s)
@@ -61,12 +65,17 @@ class TerrainkitHost(Host):
         if not terrain.is_plane:
             self.behaviors += ("staying", "climbing")  # last, since they change the levels
             self.steps = env.max_episode_length
+        self.missing["training"] = "no training was asked for; use --samples"
         if not env.gait.period:
             self.missing["stepping"] = "the task has no gait"
         if not env.has_velocity:
             names = "moving", "stepping", "climbing", "commands"
             self.missing |= dict.fromkeys(names, "the task has no velocity commands")
         self._measure(spec)
+
+    def train(self, samples: int, progress: Progress) -> Training:
+        """Train a policy briefly; `progress` gets a text after each iteration."""
+        return train_briefly(self._spec, samples, progress)
 
     def _measure(self, spec: PolicySpec) -> None:
         """Measure the actions, the commands and the symmetry of the task."""
@@ -80,6 +89,8 @@ class TerrainkitHost(Host):
         self.facts["limits"] = np.where(is_limited, bounds, [[-np.inf], [np.inf]])
         torque = env.actions.scale * model.actuator_gainprm[:, 0] / robot.effort
         self.facts["action_torque"] = torque[driven]
+        responses = step_responses(model, env.scene.default_qpos)
+        self.facts["responses"] = {response.joint: response.failure for response in responses}
         if env.has_velocity:
             rng = np.random.default_rng(1)
             self.facts["commands"] = sample_commands(rng, 1000, spec.task.commands)[0]

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.task_facts import Rollout, TaskFacts, TaskModel
+from terrainkit_robots.analysis.task_facts import Rollout, TaskFacts, TaskModel, Training
 from terrainkit_robots.description.fix import Source
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.lint.runner import lint
@@ -31,6 +31,11 @@ def rollout(rewards, observations=(0.0, 1.0), *, seconds=1.0, terminated=False, 
     )
 
 
+def training(first=(1.0, -2.0), last=(1.0, -1.5), falls=(0.1, 0.1), terms=("alive", "torques")):
+    rewards, falls = np.array([first, last]), np.array(falls)
+    return Training(terms=terms, rewards=rewards, falls=falls, robot_seconds=100.0)
+
+
 def task(rewards=(), rollouts=(), **values):
     table = HEALTHY | dict(rewards)
     made = {name: rollout(row, (k, -k)) for k, (name, row) in enumerate(table.items())}
@@ -45,6 +50,8 @@ def task(rewards=(), rollouts=(), **values):
         "limits": np.array([[-1.0], [1.0]]),
         "action_torque": np.array([0.6]),
         "asymmetry": "",
+        "responses": {"knee": "", "neck": "overshoots"},
+        "training": training(),
     }
     return TaskFacts(
         model=TaskModel("walk", "walk", Path("walk"), Source(file=Path("walk"), line=0)),
@@ -154,9 +161,24 @@ def test_constant_observation_is_named():
         ({"asymmetry": "left and right differ"}, {"TSK019"}),
         ({"commands": np.zeros((9, 3))}, {"TSK020"}),
         ({"max_speed": 0.9}, {"TSK020"}),
+        ({"responses": {"knee": "moves away from its target"}}, {"TSK021"}),
+        ({"training": Training(error="the networks have diverged")}, {"TSK022"}),
+        ({"training": training(last=(1.0, -2.09))}, {"TSK024"}),
+        # 0.1 of 1.0
+        ({"training": training((1.0, -0.5), (1.0, -0.59))}, set()),
+        ({"training": training((1.0, -0.5), (1.0, -0.61))}, {"TSK023"}),
+        # 100 and 146 falls: sqrt(246) is 15.7, and three times that 47.1
+        ({"training": training(falls=(1.0, 1.46))}, set()),
+        ({"training": training(falls=(1.0, 1.48))}, {"TSK023"}),
+        ({"training": training(falls=(0.0, 0.24))}, set()),
+        ({"training": training(falls=(0.0, 0.26))}, {"TSK023"}),
+        ({"training": training(last=(0.75, -1.49))}, set()),
+        ({"training": training(last=(0.75, -1.51))}, {"TSK024"}),
+        # Falls may outweigh the rewards.
+        ({"training": training(terms=("alive", "termination"), last=(1.0, -2.09))}, set()),
     ],
 )
-def test_spawns_actions_and_commands(values, codes):
+def test_spawns_actions_commands_and_trainings(values, codes):
     assert found(task(**values)) == codes
 
 

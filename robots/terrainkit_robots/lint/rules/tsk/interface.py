@@ -131,3 +131,23 @@ def commands(task: TaskFacts) -> Violations:
     if speed > limit:
         feet = f"the joints move a foot at {limit:.3g} m/s"
         yield violation(task, "commands", f"commands are up to {speed:.3g} m/s; {feet}")
+
+
+@rule("TSK021", "joints-follow", "error")
+def joints_follow(task: TaskFacts) -> Violations:
+    """A joint does not follow a step of its target.
+
+    Actions of a policy change a gait only if the joint gets there within the step: the gains, the
+    damping or the effort of the task are too far from the inertia of the leg.
+
+    Fix:
+        Raise the stiffness or the effort, or reduce the damping; `terrainkit onboard` derives them.
+
+    Source:
+        Steps of 0.2 rad or 2 cm with the base held. Legs of published robots reach 90 % of a step
+        in 0.19 s, and the limit is 0.3 s; a gait has half a second.
+    """
+    failures = task.value("responses")
+    failed = [f"{name} {failures[name]}" for name in task.joints if failures.get(name)]
+    if failed:
+        yield violation(task, "joints", names(failed, max_count=3))

@@ -1,1 +1,0 @@
-"""Smoke-test a robot: check whether it can be trained, with a short training."""
