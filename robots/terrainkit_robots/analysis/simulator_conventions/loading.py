@@ -29,7 +29,10 @@ _MAX_BYTES = 32 * 2**20
 """Size of all referenced files: about two seconds for their convex hulls."""
 
 _MAX_PIXELS = 4096 * 4096
-"""Size of a texture, whether it is read or generated."""
+"""Size of a texture, whether it is read or generated, and of a heightfield."""
+
+_GRIDS = {"texture": ("width", "height"), "hfield": ("nrow", "ncol")}
+"""Elements that MuJoCo allocates a grid for, and the attributes with its size."""
 
 _MAX_ALLOCATION = 1_000
 """Largest number in <size>, which allocates user data of every element, and keyframes."""
@@ -232,18 +235,17 @@ def _check_element(element: "etree._Element") -> None:
     if tag in _UNSAFE_TAGS or not is_allowed(tag):
         raise CannotCheckError(f"a file with <{tag}> is not passed to MuJoCo")
     attributes = {str(name): str(value) for name, value in element.attrib.items()}
+    side = max((_size(attributes.pop(name, "1")) for name in _GRIDS.get(tag, ())), default=1)
+    if side * side > _MAX_PIXELS:
+        raise CannotCheckError(
+            f"{tag}: got {side:g} pixels per side; expected at most {_MAX_PIXELS**0.5:g}"
+        )
     for name, text in attributes.items():
         if (not is_allowed(tag, name) and name != "user") or "octree" in name:
             raise CannotCheckError(f"<{tag} {name}=...> is not passed to MuJoCo")
         is_allocation = tag == "size" and (name.startswith("nuser") or name == "nkey")
         if is_allocation and _size(text) > _MAX_ALLOCATION:
             raise CannotCheckError(f"<size {name}={truncate(text, 20)!r}> is not passed to MuJoCo")
-    if tag == "texture":
-        side = max(_size(attributes.get(name, "1")) for name in ("width", "height"))
-        if side * side > _MAX_PIXELS:
-            raise CannotCheckError(
-                f"texture: got {side:g} pixels per side; expected at most {_MAX_PIXELS**0.5:g}"
-            )
 
 
 def _size(text: str) -> float:

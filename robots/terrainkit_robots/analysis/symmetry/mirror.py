@@ -69,7 +69,7 @@ class Mirror:
 
     normal: Matrix
     """Normal of the plane to the left in the frame of the trunk, shape (3,): y, or x if the robot
-    walks along y."""
+    walks along y, or the axis between the fingers of a gripper."""
 
     pairs: tuple[BodyPair, ...]
     """Pairs in the order of the left bodies. A body is in at most one pair."""
@@ -131,7 +131,7 @@ def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
         legs: The legs of the robot.
         bodies: The bodies, the trunk first.
     """
-    normal = _plane_normal(legs)
+    normal = _plane_normal(legs) if legs else _normal_of_sides(bodies)
     offset = _plane_offset(legs, bodies, normal)
     mirror = Mirror(normal=normal, pairs=(), offset=offset)
     points = np.array([body.zero_pose[:3, 3] - offset * normal for body in bodies]).reshape(-1, 3)
@@ -161,6 +161,15 @@ def _plane_normal(legs: Sequence[Leg]) -> Matrix:
     radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in legs)  # legs all around, as a spider's
     is_x = 2 * lateral > len(legs) and not radial
     return np.array([1.0, 0, 0] if is_x else [0, 1.0, 0])
+
+
+def _normal_of_sides(bodies: Sequence[Body]) -> Matrix:
+    """Return y, or the axis along which parts with names of sides are apart, as fingers may be."""
+    points = {body.name: body.zero_pose[:3, 3] for body in bodies}
+    pairs = [(point, points.get(swap_sides(name), point)) for name, point in points.items()]
+    apart = sum((np.abs(a - b) for a, b in pairs), np.zeros(3))
+    is_y = np.max(apart) <= apart[1] + 1e-9  # also without such names
+    return np.array([0, 1.0, 0]) if is_y else np.eye(3)[int(np.argmax(apart))]
 
 
 def _sprawls(leg: Leg) -> bool:

@@ -277,6 +277,8 @@ def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
     macro = next(iter(getattr(error, "macros", ())), None)
     name = macro.body.getAttribute("name") if macro is not None else ""
     words = f"{error} of macro {name}" if name else str(error) or type(error).__name__
+    if "unknown macro" in words and b"<include " in Path(request["file"]).read_bytes():
+        words += "; xacro reads <xacro:include>, not <include>"
     return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
 
 

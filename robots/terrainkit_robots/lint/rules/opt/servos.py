@@ -1,7 +1,7 @@
 """Rules on position actuators, keyframes and reference positions of an MJCF file."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from terrainkit_robots.simulation.written_model import (
     make_written_model,
     position_servos,
 )
-from terrainkit_robots.text import count
+from terrainkit_robots.text import names
 
 # The models of MuJoCo Menagerie and Playground have 0.11 to 1.2, and robots of others 0.03.
 _MIN_DAMPING_RATIO = 0.02
@@ -77,8 +77,8 @@ def _actuator(robot: Facts, joint: str) -> Part:
     return Part(joint, sources.get(joint, robot.model.source))
 
 
-def _others(number: int, noun: str = "other joint") -> str:
-    return f"; the same applies to {count(number - 1, noun)}" if number > 1 else ""
+def _others(items: Sequence[str]) -> str:
+    return f"; the same applies to {names(items)}" if items else ""
 
 
 @rule("OPT010", "undamped-position-gain", "warning", needs=("mjcf", "legs", "simulation"))
@@ -109,7 +109,8 @@ def undamped_position_gain(robot: Facts) -> Violations:
             message=f"damping of the position actuator of joint {worst.joint}: got "
             f"{worst.damping:g} N m s/rad with a gain of {worst.stiffness:g} N m/rad, "
             f"{found[worst]:.1%} of critical damping; expected at least {_MIN_DAMPING_RATIO:.0%}; "
-            f"it swings at {frequency:.0f} Hz" + _others(len(loose)),
+            f"it swings at {frequency:.0f} Hz"
+            + _others([servo.joint for servo in loose if servo is not worst]),
             measured={"ratio": found[worst], "joints": len(loose)},
         )
 
@@ -137,7 +138,7 @@ def excessive_control_range(robot: Facts) -> Violations:
             severity=None if worst.excess > _MAX_EXCESS else "note",
             message=f"ctrlrange of the position actuator of joint {worst.joint}: got {low:g} to "
             f"{high:g} rad, {worst.excess:.3g} rad beyond the limits of the joint; expected "
-            "targets within them" + _others(len(found)),
+            "targets within them" + _others([servo.joint for servo in found if servo is not worst]),
             measured={"excess": worst.excess, "joints": len(found)},
         )
 
@@ -171,14 +172,16 @@ def keyframe_outside_limits(robot: Facts) -> Violations:
         excess[[not len(getattr(key, field)) for key in spec.keys]] = 0
         keys, outside = np.nonzero(excess > np.minimum(_TOLERANCE, _MAX_SHARE * (high - low)))
         if len(keys):
+            found = [getattr(model, kind)(int(index)) for index in indices[outside]]
+            places = [
+                f"{item.name or item.id + 1} in keyframe {model.key(int(key)).name or key + 1}"
+                for item, key in zip(found, keys, strict=True)
+            ]
             key, column = int(keys[0]), int(outside[0])
-            index = int(indices[column])
-            name = getattr(model, kind)(index).name or str(index + 1)
             yield Violation(
-                element=Part(name, robot.model.source),
-                message=f"{field} of {kind} {name} in keyframe {model.key(key).name or key + 1}: "
-                f"got {values[key, column]:.5g}; expected {low[column]:.5g} to {high[column]:.5g}"
-                + _others(len(keys), "other value"),
+                element=Part(found[0].name or str(found[0].id + 1), robot.model.source),
+                message=f"{field} of {kind} {places[0]}: got {values[key, column]:.5g}; expected "
+                f"{low[column]:.5g} to {high[column]:.5g}" + _others(places[1:]),
                 measured={"values": len(keys)},
             )
 
@@ -218,6 +221,6 @@ def reference_outside_limits(robot: Facts) -> Violations:
                 element=joint,
                 message=f"{name} of joint {joint.name}: got {value:.4g} {joint.unit}; expected a "
                 f"position within its limits of {low:.4g} to {high:.4g} {joint.unit}"
-                + _others(len(found)),
+                + _others([other.name for other, *_ in found[1:]]),
                 measured={"value": value, "joints": len(found)},
             )
