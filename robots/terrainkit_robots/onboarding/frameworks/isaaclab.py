@@ -107,7 +107,8 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
         )
     return [
         *paragraphs,
-        "Isaac Lab orders joints breadth-first, which may differ from the order of robot.toml.",
+        "Isaac Lab orders joints breadth-first, on Newton depth-first, which may differ from the "
+        "order of robot.toml.",
     ]
 
 
