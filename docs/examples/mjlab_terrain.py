@@ -19,7 +19,7 @@ terrainkit.generate(config).save("map.npz", overwrite=True)
 task = "Mjlab-Velocity-Rough-Unitree-Go1"
 train, play, agent = load_env_cfg(task), load_env_cfg(task, play=True), load_rl_cfg(task)
 train.scene.terrain = play.scene.terrain = terrain_entity_cfg("map.npz")
-use_terrain_curriculum(train)  # optional: see "Levels that rise" in docs/isaaclab.md
+use_terrain_curriculum(train)  # optional: see docs/levels.md
 agent.logger = "tensorboard"  # mjlab's default needs an account
 register_mjlab_task("Map-Go1", train, play, agent, load_runner_cls(task))
 

@@ -252,7 +252,7 @@ with environment(terrain, use_curriculum=True) as env:
 print(f"Isaac Lab {version('isaaclab')}, Newton {version('newton')}: levels move, ", end="")
 print(f"{within.mean():.1%} of {len(within)} rays within 1 mm")
 
-# The velocity task of an onboarded robot; its URDF is only imported with Isaac Sim.
+# The velocity task of an onboarded robot.
 options = OnboardOptions(frameworks=("isaaclab",), render_images=False)
 onboard(bundled.urdf_path("quadruped"), folder / "quadruped", options)
 sys.path.insert(0, str(folder / "quadruped"))
@@ -297,3 +297,9 @@ run = subprocess.run([sys.executable, example], cwd=folder, capture_output=True,
 (distance,) = re.findall(r"balls rest within ([0-9.]+) mm", run.stdout) or [run.stderr]
 assert float(distance) < 2.0, distance
 print(f"{example.name}: all balls within {distance} mm")
+
+for robot in ("quadruped", "biped"):
+    command = [sys.executable, example.with_name("isaaclab_robot.py"), robot]
+    run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert "Learning iteration 1/2" in run.stdout, run.stderr
+print("isaaclab_robot.py: the quadruped and the biped train two iterations")

@@ -23,7 +23,10 @@ PACKAGES = {
     "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
     "mjx": [["mujoco-mjx==3.17.0"]],
     "isaaclab2": [["torch", "packaging", "gymnasium"], ["--no-deps", "isaaclab==2.3.2.post1"]],
-    "isaaclab3": [["isaaclab==3.0.0"]],
+    "isaaclab3": [
+        ["isaaclab==3.0.0", "urdf-usd-converter==0.3.4", "mujoco-usd-converter==0.6.1"],
+        ["--no-deps", "isaacsim-asset-isolated==6.2.0.0", "isaacsim-robot-schema==6.2.0.0"],
+    ],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
     "drake": [["drake==1.58.0"]],

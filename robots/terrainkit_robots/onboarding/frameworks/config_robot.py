@@ -48,6 +48,9 @@ class ConfigRobot:
     foot_height: float = 0.0
     """Height of the frames of the feet above the ground when the robot stands [m]."""
 
+    has_fixed_feet: bool = False
+    """Whether the feet are bodies on fixed joints, which are not merged."""
+
     has_map: bool = False
     """Whether the robot is trained on a map, in terrain.py beside the configuration."""
 

@@ -120,6 +120,7 @@ def robot_config_files(
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
         roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},
         foot_height=_foot_height(facts, spec),
+        has_fixed_feet=not set(spec.feet) <= set(bodies),
         has_map=has_map,
     )
     return config_files(name, robot)

@@ -38,8 +38,12 @@ _TASK_IMPORTS = [
     "",
     "try:",
     "    from isaaclab_tasks.core.velocity import velocity_env_cfg",
+    "",
+    "    IS_ISAACLAB_3 = True",
     "except ModuleNotFoundError:  # Isaac Lab 2",
     "    from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
+    "",
+    "    IS_ISAACLAB_3 = False",
 ]
 
 
@@ -65,6 +69,7 @@ def config_text(robot: ConfigRobot) -> str:
         ),
         name=name,
         fix_base=str(not spec.floating),
+        merge="not IS_ISAACLAB_3" if robot.has_fixed_feet else "True",
         init_state=initial_state(robot, usd_patterns(robot.all_joints), depth=2),
         soft_limit=robot.soft_limit_comment(depth=1),
         factor=source.float_literal(robot.soft_limit_factor),
@@ -102,7 +107,8 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
         )
     return [
         *paragraphs,
-        "Isaac Lab orders joints breadth-first, which may differ from the order of robot.toml.",
+        "Isaac Lab orders joints breadth-first, on Newton depth-first, which may differ from the "
+        "order of robot.toml.",
     ]
 
 
