@@ -27,6 +27,10 @@ class Average(Command):
     """Number of checkpoints to average, at least 2; by default, training writes one every 100
     iterations (--runner.save-interval)."""
 
+    base: Annotated[str, option("RUN")] = ""
+    """The run that the training started from, for the mean of its policy and that of the
+    checkpoints; what it could do and the training did not repeat is forgotten less."""
+
     output: OutputPath | None = None
     """Folder of the new run."""
 
@@ -42,11 +46,12 @@ class Average(Command):
         from terrainkit_robots.rl.run import open_run
 
         run = open_run(self.source, task_file=self.task)
-        averaged = average_checkpoints(run, self.checkpoints, self.output)
+        base = open_run(self.base, task_file=self.task) if self.base else None
+        averaged = average_checkpoints(run, self.checkpoints, self.output, base)
         first, *_, last = averaged.info.averaged
         render.result(
             f"wrote {averaged.folder}: the mean of {self.checkpoints} checkpoints, "
-            f"{first} to {last}"
+            f"{first} to {last}{f', and {self.base}' if self.base else ''}"
         )
         task = f" --task {quote(str(self.task))}" if self.task else ""
         render.result(f"next: terrainkit evaluate {quote(str(averaged.folder))}{task}")

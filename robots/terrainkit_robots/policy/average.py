@@ -11,7 +11,7 @@ from terrainkit_robots.policy.bundle import write_policy
 from terrainkit_robots.rl.run import Run, checkpoints, last_checkpoint
 
 
-def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
+def average_checkpoints(run: Run, number: int, folder: Path, base: Run | None = None) -> Run:
     """Write a run whose networks are the mean of the last checkpoints of another run.
 
     The checkpoints of one training differ in the terrain and the disturbances that they can handle,
@@ -22,12 +22,15 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
         run: The run. Checkpoints after the selected one are not used.
         number: Number of checkpoints, at least 2.
         folder: New folder.
+        base: The run that the training started from; the networks are then the mean of its last
+            checkpoint and that mean, which keeps more of what it could do (arXiv:2109.01903).
 
     Returns:
         The new run.
 
     Raises:
-        ConfigError: If the run has fewer checkpoints, or they do not fit the selected one.
+        ConfigError: If the run has fewer checkpoints, or they or that of `base` do not fit the
+            selected one.
         ExportError: If the folder is not empty, or cannot be written.
     """
     last = policy_state(read_checkpoint(last_checkpoint(run)))
@@ -44,9 +47,9 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
         )
     used = list(saved)[-number:]
     states = [*(_read_like(saved[i], last) for i in used[:-1]), last]
-    mean = last.copy()
-    mean["actor_state_dict"] = _mean([state["actor_state_dict"] for state in states])
-    mean["critic_state_dict"] = _mean([state["critic_state_dict"] for state in states])
+    mean = _mean(states)
+    if base:
+        mean = _mean([_read_like(last_checkpoint(base), last), mean])
     return write_policy(run, replace(run.info, averaged=tuple(used)), mean, folder)
 
 
@@ -59,7 +62,15 @@ def _read_like(path: Path, other: Checkpoint) -> Checkpoint:
     return state
 
 
-def _mean(networks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _mean(states: Sequence[Checkpoint]) -> Checkpoint:
+    """Return the last checkpoint with the mean of the networks."""
+    mean = states[-1].copy()
+    mean["actor_state_dict"] = _mean_network([state["actor_state_dict"] for state in states])
+    mean["critic_state_dict"] = _mean_network([state["critic_state_dict"] for state in states])
+    return mean
+
+
+def _mean_network(networks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the mean of each parameter; integers, such as numbers of samples, are the last's."""
     import torch
 

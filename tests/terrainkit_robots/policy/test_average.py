@@ -46,6 +46,14 @@ def test_mean_of_the_last_checkpoints(run, tmp_path, selected, number, iteration
     assert load_policy(averaged, env)(env.get_observations()).isfinite().all()
 
 
+def test_mean_with_the_policy_before(run, tmp_path):
+    base = open_run(run.folder, 2)
+    averaged = average_checkpoints(run, 3, tmp_path / "new", base)
+    weight = read_checkpoint(averaged.checkpoint)["actor_state_dict"][WEIGHT]
+    assert (weight == (2 + (3 + 4 + 5) / 3) / 2).all()
+    assert averaged.info.averaged == (3, 4, 5)
+
+
 @pytest.mark.parametrize("number", [-1, 0, 1, 5])
 def test_average_needs_as_many_checkpoints(run, tmp_path, number):
     with pytest.raises(ConfigError, match=rf"got {number}; expected at least 2; .*run has 4 up to"):
