@@ -50,6 +50,6 @@ gymnasium.register(
         "rsl_rl_cfg_entry_point": f"{agents}:UnitreeGo2RoughPPORunnerCfg",
     },
 )
-small = ["--num_envs", "16", "--max_iterations", "2", "--device", "cpu"]
+small = ["--num_envs", "16", "--max_iterations", "2", "--device", "cpu", "agent.device=cpu"]
 task = ["--rl_library", "rsl_rl", "--task", "Map-v0"]
 sys.exit(run_train_cli([*task, *(sys.argv[2:] or small)]))
