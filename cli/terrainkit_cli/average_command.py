@@ -28,8 +28,8 @@ class Average(Command):
     iterations (--runner.save-interval)."""
 
     base: Annotated[str, option("RUN")] = ""
-    """The run that the training started from, for the mean of its policy and that of the
-    checkpoints; what it could do and the training did not repeat is forgotten less."""
+    """The run that the training started from: the result is the mean of its policy and of the mean
+    of the checkpoints. This preserves more of the skills that the training did not practice."""
 
     output: OutputPath | None = None
     """Folder of the new run."""
@@ -50,8 +50,8 @@ class Average(Command):
         averaged = average_checkpoints(run, self.checkpoints, self.output, base)
         first, *_, last = averaged.info.averaged
         render.result(
-            f"wrote {averaged.folder}: the mean of {self.checkpoints} checkpoints, "
-            f"{first} to {last}{f', and {self.base}' if self.base else ''}"
+            f"wrote {averaged.folder}: {f'the mean of {self.base} and of ' if self.base else ''}"
+            f"the mean of {self.checkpoints} checkpoints, {first} to {last}"
         )
         task = f" --task {quote(str(self.task))}" if self.task else ""
         render.result(f"next: terrainkit evaluate {quote(str(averaged.folder))}{task}")

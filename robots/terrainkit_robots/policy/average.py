@@ -47,10 +47,12 @@ def average_checkpoints(run: Run, number: int, folder: Path, base: Run | None = 
         )
     used = list(saved)[-number:]
     states = [*(_read_like(saved[i], last) for i in used[:-1]), last]
-    mean = _mean(states)
+    mean, info = _mean(states), replace(run.info, averaged=tuple(used))
     if base:
-        mean = _mean([_read_like(last_checkpoint(base), last), mean])
-    return write_policy(run, replace(run.info, averaged=tuple(used)), mean, folder)
+        path = last_checkpoint(base)
+        mean = _mean([_read_like(path, last), mean])
+        info = replace(info, base=f"{path.parent.name}/{path.name}")
+    return write_policy(run, info, mean, folder)
 
 
 def _read_like(path: Path, other: Checkpoint) -> Checkpoint:

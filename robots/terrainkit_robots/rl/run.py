@@ -64,6 +64,8 @@ class RunInfo(Config):
     """Digest of the robot's model by file name."""
     averaged: tuple[int, ...] = ()
     """Iterations of the checkpoints whose networks were averaged."""
+    base: str = ""
+    """Checkpoint of another run that is the other half of the mean; empty for none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
