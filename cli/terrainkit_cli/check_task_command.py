@@ -51,7 +51,7 @@ class CheckTask(Command):
 
     samples: Annotated[int, Meta(ge=50_000), option("N")] | None = None
     """Also train with this many samples on a plane, and check whether the robot learns to fall;
-    100000 take about a minute. Only for tasks of terrainkit; by default, without a training."""
+    100000 take about half a minute. Only for tasks of terrainkit; by default, there is none."""
 
     format: Literal["text", "json", "sarif", "github"] = "text"
     """Format of the report."""

@@ -30,6 +30,9 @@ def measure_task(
         progress: Called with a text at each behavior and each iteration of the training.
         samples: Samples of a short training; None for none.
     """
+    facts = dict(host.facts)
+    if samples:
+        facts["training"] = host.train(samples, progress)
     rollouts, missing = {}, dict(host.missing)
     for name in host.behaviors:
         progress(f"behavior {name}")
@@ -38,9 +41,6 @@ def measure_task(
                 rollouts[name] = roll(host, name)
         except CannotCheckError as error:
             missing[name] = str(error)
-    facts = dict(host.facts)
-    if samples:
-        facts["training"] = host.train(samples, progress)
     if "clearance" not in missing:
         host.reset("statue")
         facts["clearance"] = host.clearance()

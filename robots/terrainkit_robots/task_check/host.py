@@ -116,7 +116,10 @@ class Host(ABC):
         Raises:
             ConfigError: if the host has no training.
         """
-        raise ConfigError(f"samples: got {samples} for a task of {self.name}; expected none")
+        raise ConfigError(
+            f"--samples: got {samples} for a task of {self.name}; leave it out, since only tasks "
+            "of terrainkit have a short training"
+        )
 
     @property
     def height(self) -> int:
