@@ -164,12 +164,16 @@ def _plane_normal(legs: Sequence[Leg]) -> Matrix:
 
 
 def _normal_of_sides(bodies: Sequence[Body]) -> Matrix:
-    """Return y, or the axis along which parts with names of sides are apart, as fingers may be."""
+    """Return y, or the axis to the parts named left from those named right, as fingers may be."""
     points = {body.name: body.zero_pose[:3, 3] for body in bodies}
-    pairs = [(point, points.get(swap_sides(name), point)) for name, point in points.items()]
-    apart = sum((np.abs(a - b) for a, b in pairs), np.zeros(3))
-    is_y = np.max(apart) <= apart[1] + 1e-9  # also without such names
-    return np.array([0, 1.0, 0]) if is_y else np.eye(3)[int(np.argmax(apart))]
+    lefts = [name for name in points if _is_left(name) and swap_sides(name) in points]
+    to_left = sum((points[name] - points[swap_sides(name)] for name in lefts), np.zeros(3))
+    axis = int(np.argmax(np.abs(to_left)))
+    if abs(to_left[axis]) <= abs(to_left[1]) + 1e-9:  # also without such names
+        return np.array([0, 1.0, 0])
+    normal = np.zeros(3)
+    normal[axis] = np.sign(to_left[axis])
+    return normal
 
 
 def _sprawls(leg: Leg) -> bool:
@@ -247,8 +251,7 @@ def _pairs_by_name(
                 continue
             # If a sign is wrong, both may be on one side; they still are a pair.
             left, right = points[[index, other]] @ mirror.normal
-            is_left = any(word.lower() in _LEFT_TO_RIGHT for word in _TOKEN.findall(name))
-            if left >= right and is_left:
+            if left >= right and _is_left(name):
                 yield index, other
 
 
@@ -261,6 +264,10 @@ def _has_lone_letter(name: str) -> bool:
 def side_words(name: str) -> list[str]:
     """Return the words of a name that mark a side, such as FL or left, as they are written."""
     return [word for word in _TOKEN.findall(name) if word.lower() in _SIDES]
+
+
+def _is_left(name: str) -> bool:
+    return any(word.lower() in _LEFT_TO_RIGHT for word in _TOKEN.findall(name))
 
 
 def swap_sides(name: str) -> str:
