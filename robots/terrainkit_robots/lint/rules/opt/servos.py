@@ -16,7 +16,7 @@ from terrainkit_robots.simulation.written_model import (
     make_written_model,
     position_servos,
 )
-from terrainkit_robots.text import names
+from terrainkit_robots.text import count, names
 
 # The models of MuJoCo Menagerie and Playground have 0.11 to 1.2, and robots of others 0.03.
 _MIN_DAMPING_RATIO = 0.02
@@ -78,7 +78,8 @@ def _actuator(robot: Facts, joint: str) -> Part:
 
 
 def _others(items: Sequence[str]) -> str:
-    return f"; the same applies to {names(items)}" if items else ""
+    others = f"{count(len(items), 'other joint')}: {names(items)}"
+    return f"; the same applies to {others}" if items else ""
 
 
 @rule("OPT010", "undamped-position-gain", "warning", needs=("mjcf", "legs", "simulation"))
