@@ -293,13 +293,14 @@ assert error < 2e-3, error
 print(f"mesh with solids: started in {started:.1f} s, all balls within {error * 1e3:.1f} mm")
 
 example = Path(__file__).parents[2] / "docs/examples/isaaclab_terrain.py"
+ROBOT_EXAMPLE = Path(__file__).parents[2] / "docs/examples/isaaclab_robot.py"
 run = subprocess.run([sys.executable, example], cwd=folder, capture_output=True, text=True)
 (distance,) = re.findall(r"balls rest within ([0-9.]+) mm", run.stdout) or [run.stderr]
 assert float(distance) < 2.0, distance
 print(f"{example.name}: all balls within {distance} mm")
 
 for robot in ("quadruped", "biped"):
-    command = [sys.executable, example.with_name("isaaclab_robot.py"), robot]
+    command = [sys.executable, ROBOT_EXAMPLE, robot]
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert "Learning iteration 1/2" in run.stdout, run.stderr
 print("isaaclab_robot.py: the quadruped and the biped train two iterations")

@@ -69,7 +69,7 @@ def config_text(robot: ConfigRobot) -> str:
         ),
         name=name,
         fix_base=str(not spec.floating),
-        merge="not IS_ISAACLAB_3" if robot.has_fixed_feet else "True",
+        merge="not IS_ISAACLAB_3" if is_legged and robot.has_fixed_feet else "True",
         init_state=initial_state(robot, usd_patterns(robot.all_joints), depth=2),
         soft_limit=robot.soft_limit_comment(depth=1),
         factor=source.float_literal(robot.soft_limit_factor),
