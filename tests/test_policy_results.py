@@ -23,6 +23,9 @@ def test_result_has_a_suite_a_source_and_the_shares_of_its_attempts(path):
     assert card["sha256"] == terrainkit.get_suite(card["map"]).sha256
     names = [choice.name for choice in terrainkit.get_suite(card["map"]).config.terrains]
     assert [test["name"] for test in card["tests"]] == names
+    outcomes = [level["outcomes"] for test in card["tests"] for level in test["levels"]]
+    total = wilson(sum(o["crossed"] for o in outcomes), sum(sum(o.values()) for o in outcomes))
+    assert card["interval"] == pytest.approx(total, abs=1e-5)
     for test in card["tests"]:
         crossed = [level["outcomes"]["crossed"] for level in test["levels"]]
         attempts = [sum(level["outcomes"].values()) for level in test["levels"]]
