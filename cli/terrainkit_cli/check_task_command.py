@@ -49,7 +49,7 @@ class CheckTask(Command):
     terrain: TerrainName = ""
     """plane, a map (.npz), or a map config (.toml); by default, plane or the terrain of the run."""
 
-    samples: Annotated[int, Meta(ge=50_000), option("N")] | None = None
+    samples: Annotated[int, Meta(ge=100_000), option("N")] | None = None
     """Also train with this many samples on a plane, and check whether the robot learns to fall;
     100000 take about half a minute. Only for tasks of terrainkit; by default, there is none."""
 
