@@ -77,8 +77,8 @@ def _actuator(robot: Facts, joint: str) -> Part:
     return Part(joint, sources.get(joint, robot.model.source))
 
 
-def _others(items: Sequence[str]) -> str:
-    others = f"{count(len(items), 'other joint')}: {names(items)}"
+def _others(items: Sequence[str], word: str = "joint") -> str:
+    others = f"{count(len(items), f'other {word}')}: {names(items)}"
     return f"; the same applies to {others}" if items else ""
 
 
@@ -182,7 +182,7 @@ def keyframe_outside_limits(robot: Facts) -> Violations:
             yield Violation(
                 element=Part(found[0].name or str(found[0].id + 1), robot.model.source),
                 message=f"{field} of {kind} {places[0]}: got {values[key, column]:.5g}; expected "
-                f"{low[column]:.5g} to {high[column]:.5g}" + _others(places[1:]),
+                f"{low[column]:.5g} to {high[column]:.5g}" + _others(places[1:], "value"),
                 measured={"values": len(keys)},
             )
 
