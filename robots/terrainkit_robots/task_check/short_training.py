@@ -1,6 +1,5 @@
 """A short training that records rewards and falls."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +13,7 @@ from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.task_check.host import Progress
 
 NUM_ENVS = 128
 """Number of robots."""
@@ -39,7 +39,7 @@ def record_steps(env: LeggedEnv) -> list[list[float]]:
 
 
 @single_torch_thread()
-def train_briefly(spec: PolicySpec, samples: int, progress: Callable[[str], object]) -> Training:
+def train_briefly(spec: PolicySpec, samples: int, progress: Progress) -> Training:
     """Train a policy on a plane from scratch; the random state of torch stays as it is.
 
     Args:
