@@ -21,7 +21,7 @@ from terrainkit_robots.files import open_regular
 FoundBy = Literal["path", "package", "search", "nothing"]
 
 _PACKAGE = re.compile(
-    r"(?:(?:package|model):/+|\$\(\s*find\s+(?=[^()\s]+\s*\)))(?P<name>[^/\\()\s]+)\s*\)?"
+    r"(?:(?:package|model):/+|(?:file:/*)?\$\(\s*find\s+(?=[^()\s]+\s*\)))(?P<name>[^/\\()\s]+)\s*\)?"
     r"(?:[/\\]+(?P<rest>.*))?",
     re.DOTALL,
 )

@@ -156,12 +156,17 @@ def _has_zero_axis(joint: Joint) -> bool:
 
 
 def _is_half_rotation(left: MirrorSide, right: MirrorSide) -> bool:
-    """Return whether one joint is the other rotated by half a turn, as in fingers of a gripper."""
+    """Return whether one joint is the other rotated by half a turn, as in fingers of a gripper.
+
+    Slides may also start at one point.
+    """
     if left.body.parent != right.body.parent:
         return False
     offset = float(np.linalg.norm(left.offset))
     tolerance = MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * offset
-    turns = (np.array([1, -1, -1]), np.array([-1, 1, -1]), np.array([-1, -1, 1]))
+    turns = [np.array([1, -1, -1]), np.array([-1, 1, -1]), np.array([-1, -1, 1])]
+    if left.joint.kind == "prismatic":
+        turns.append(np.array([1, 1, 1]))
     return any(
         float(np.linalg.norm(left.offset * turn - right.offset)) <= tolerance for turn in turns
     )

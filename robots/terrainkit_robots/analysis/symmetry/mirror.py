@@ -131,8 +131,11 @@ def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
         legs: The legs of the robot.
         bodies: The bodies, the trunk first.
     """
-    normal = _plane_normal(legs) if legs else _normal_of_sides(bodies)
-    offset = _plane_offset(legs, bodies, normal)
+    sides = [] if legs else list(_named_sides(bodies))
+    normal = _plane_normal(legs) if legs else _normal_of_sides(sides)
+    starts = [leg.limb.points[0] for leg in legs]
+    starts += [body.zero_pose[:3, 3] for pair in sides for body in pair]
+    offset = _plane_offset(starts, bodies, normal)
     mirror = Mirror(normal=normal, pairs=(), offset=offset)
     points = np.array([body.zero_pose[:3, 3] - offset * normal for body in bodies]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
@@ -163,17 +166,32 @@ def _plane_normal(legs: Sequence[Leg]) -> Matrix:
     return np.array([1.0, 0, 0] if is_x else [0, 1.0, 0])
 
 
-def _normal_of_sides(bodies: Sequence[Body]) -> Matrix:
-    """Return y, or the axis to the parts named left from those named right, as fingers may be."""
-    points = {body.name: body.zero_pose[:3, 3] for body in bodies}
-    lefts = [name for name in points if _is_left(name) and swap_sides(name) in points]
-    to_left = sum((points[name] - points[swap_sides(name)] for name in lefts), np.zeros(3))
+def _named_sides(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
+    """Yield the bodies that are named left, each with the one that is named right."""
+    by_name = {body.name: body for body in bodies}
+    for body in bodies:
+        other = by_name.get(swap_sides(body.name))
+        if other is not None and _is_left(body.name):
+            yield body, other
+
+
+def _normal_of_sides(sides: Sequence[tuple[Body, Body]]) -> Matrix:
+    """Return y, or the axis to the left parts from the right ones, as fingers may be.
+
+    The centers of mass are compared, since the slides of two fingers may start at one point.
+    """
+    to_left = sum((_center(left) - _center(right) for left, right in sides), np.zeros(3))
     axis = int(np.argmax(np.abs(to_left)))
     if abs(to_left[axis]) <= abs(to_left[1]) + 1e-9:  # also without such names
         return np.array([0, 1.0, 0])
     normal = np.zeros(3)
     normal[axis] = np.sign(to_left[axis])
     return normal
+
+
+def _center(body: Body) -> Matrix:
+    """Return the center of mass in the frame of the trunk, all joints at zero, shape (3,) [m]."""
+    return np.asarray(body.zero_pose[:3, :3] @ body.center + body.zero_pose[:3, 3])
 
 
 def _sprawls(leg: Leg) -> bool:
@@ -186,17 +204,20 @@ def _sprawls(leg: Leg) -> bool:
     return bool(levers) and bool(np.hypot(*levers[0][:2]) > _MIN_REACH * leg.length)
 
 
-def _plane_offset(legs: Sequence[Leg], bodies: Sequence[Body], normal: Matrix) -> float:
-    """Return the distance of the center of the legs from the trunk's origin along the normal [m].
+def _plane_offset(points: Sequence[Matrix], bodies: Sequence[Body], normal: Matrix) -> float:
+    """Return the distance of the middle of the sides from the trunk's origin along the normal [m].
 
     Zero unless the center of mass of the trunk is there too; otherwise a leg is misplaced.
+
+    Args:
+        points: Starts of the legs, or of the parts that are named left and right.
+        bodies: The bodies, the trunk first.
+        normal: Normal of the mirror plane.
     """
-    # The median of the legs, since one leg may be misplaced.
-    starts = sorted(float(leg.limb.points[0] @ normal) for leg in legs)
-    if len(starts) < 2:
+    if len(points) < 2:
         return 0.0
-    half = len(starts) // 2
-    median = (starts[half - 1] + starts[-half]) / 2
+    # The median, since one leg may be misplaced.
+    median = float(np.median([point @ normal for point in points]))
     trunk = float(bodies[0].center @ normal)
     return median if abs(trunk - median) < abs(trunk) / 2 else 0.0
 

@@ -221,7 +221,7 @@ class _TreeReader:
         """Return the tree of a model; `parents` are the files of the models that attach it."""
         self._mjcf.sources.append(main.file)
         folder = main.file.parent
-        included: dict[Path, tuple[Path, ...]] = {_real_path(main.file): ()}
+        included: dict[Path, tuple[Path, ...]] = {main.file: ()}
         top = Node(tag="", source=main.source(_root(main)), folder=folder)
         stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(_root(main), main, top, 0)]
         while stack and self._count <= MAX_ELEMENTS:
@@ -294,7 +294,7 @@ class _TreeReader:
             RobotFileError: If it cannot be included.
         """
         name = (element.get("file") or "").strip()
-        chain = (*included[_real_path(doc.file)], _real_path(doc.file))
+        chain = (*included[doc.file], _real_path(doc.file))
         if len(element):
             message = f"<include file={name!r}> has children; MuJoCo rejects the file"
             self._report(doc.source(element), message, name)
@@ -302,11 +302,12 @@ class _TreeReader:
         sibling = doc.file.parent / name
         if not self._exists(path) and self._exists(sibling):
             path = sibling
-        if name and _real_path(path) in included:
-            how = "by itself" if _real_path(path) in chain else "twice"
+        is_cyclic = _real_path(path) in chain
+        if is_cyclic or path in included:  # MuJoCo includes one file by several links
+            how = "by itself" if is_cyclic else "twice"
             raise RobotFileError(f"{name} is included {how}; MuJoCo rejects the file")
         part = self._read(path, name, "include")
-        included[_real_path(path)] = chain
+        included[path] = chain
         self._mjcf.sources.append(path)
         if not len(_root(part)):
             raise RobotFileError(f"{name} is empty; expected elements to include")

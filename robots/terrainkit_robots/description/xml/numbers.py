@@ -52,12 +52,12 @@ _MAX_ANGLE = 6.35
 
 
 def is_in_degrees(angles: Sequence[float]) -> bool:
-    """Return whether an angle [rad] is probably in degrees: over a turn, and no multiple of 90 deg.
+    """Return whether an angle [rad] is probably in degrees: over a turn, and no common part of one.
 
-    Exporters sometimes write 9.4248 or 7.854, which are whole quarter turns.
+    Exporters sometimes write 9.4248 or 7.854, and programs that place parts on a circle 7.0686.
     """
-    quarter = math.pi / 2
+    part = math.radians(7.5)  # of which 15, 22.5, 30 and 45 degrees are multiples
     return any(
-        _MAX_ANGLE < abs(angle) < 1e4 and abs(angle - quarter * round(angle / quarter)) > 1e-3
+        _MAX_ANGLE < abs(angle) < 1e4 and abs(angle - part * round(angle / part)) > 1e-3
         for angle in angles
     )

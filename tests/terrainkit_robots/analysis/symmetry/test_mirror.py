@@ -170,9 +170,9 @@ def test_legs_that_a_yaw_joint_swings_step_along_their_pitch_axis(reach, normal)
     ],
 )
 def test_plane_is_amid_the_legs_if_the_trunk_is_too(starts, trunk, offset):
-    legs = [SimpleNamespace(limb=SimpleNamespace(points=np.array([[1, y, 2]]))) for y in starts]
+    points = [np.array([1, y, 2]) for y in starts]
     bodies = [SimpleNamespace(center=np.array([3, trunk, 4]))]
-    assert _plane_offset(legs, bodies, np.array([0.0, 1.0, 0.0])) == offset
+    assert _plane_offset(points, bodies, np.array([0.0, 1.0, 0.0])) == offset
 
 
 def test_mirror_of_a_trunk_whose_frame_is_at_its_side():

@@ -51,6 +51,23 @@ def test_included_elements_have_file_and_line(tmp_path):
     mujoco.MjSpec.from_file(str(file))  # so does MuJoCo
 
 
+def test_one_file_is_included_by_two_links(tmp_path):
+    file = made_robots.write_all(
+        tmp_path,
+        {
+            "robot.xml": '<mujoco><worldbody><body name="a"><include file="left.xml"/></body>'
+            '<body name="b"><include file="right.xml"/></body></worldbody></mujoco>',
+            "pad.xml": '<x><geom size="1"/></x>',
+        },
+    )
+    for name in ("left.xml", "right.xml"):
+        (tmp_path / name).symlink_to("pad.xml")
+    robot = load_robot(file)
+    assert robot.problems == ()
+    assert [len(link(robot, name).collisions) for name in "ab"] == [1, 1]
+    mujoco.MjSpec.from_file(str(file))
+
+
 def test_include_relative_to_including_file(tmp_path):
     file = made_robots.write_all(
         tmp_path,

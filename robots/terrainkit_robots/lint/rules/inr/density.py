@@ -8,6 +8,7 @@ from terrainkit_robots.analysis.inertia.density import (
 )
 from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_part
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
+from terrainkit_robots.export.canonical import has_floating_base
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
@@ -45,10 +46,12 @@ def implausible_density(robot: Facts) -> Violations:
         if result:
             volume, limit = result
             density = body.mass / volume
+            is_fixed = body.index == 0 and not has_floating_base(robot)
             got, expected = ("at least", "at most") if density > limit else ("at most", "at least")
             yield Violation(
                 element=mass_part(body.main_link),
                 message=f"density of body {body.name}: got {got} {density:.3g} kg/m3 "
                 f"({body.mass:.3g} kg in {volume:.3g} m3); expected {expected} {limit:,.0f} kg/m3",
+                severity="note" if is_fixed else None,  # its mass has no effect
                 measured={"mass": body.mass, "volume": volume, "density": density},
             )

@@ -104,15 +104,17 @@ def missing_leg_joint(robot: Facts) -> Violations:
     Source:
         Comparison with the number of joints that most legs have.
     """
-    counts = Counter(len(leg.joints) for leg in robot.legs)
-    usual, _ = max(counts.items(), key=lambda item: (item[1], item[0]))
-    for leg in robot.legs:
-        if len(leg.joints) < usual:
+    legs_of = Counter(joint.name for leg in robot.legs for joint in leg.joints)
+    # A joint of the spine carries several legs and belongs to none.
+    counts = [sum(legs_of[joint.name] == 1 for joint in leg.joints) for leg in robot.legs]
+    usual, _ = max(Counter(counts).items(), key=lambda item: (item[1], item[0]))
+    for leg, count in zip(robot.legs, counts, strict=True):
+        if count < usual:
             yield Violation(
                 element=robot.tree.links[leg.foot],
-                message=f"moving joints of the leg with foot {leg.foot}: got {len(leg.joints)}; "
+                message=f"moving joints of the leg with foot {leg.foot}: got {count}; "
                 f"expected {usual}, as in the other legs",
-                measured={"joints": len(leg.joints), "usual": usual},
+                measured={"joints": count, "usual": usual},
             )
 
 

@@ -154,8 +154,10 @@ def package_uri(robot: Facts) -> Violations:
     """
     groups: dict[tuple[str, str], list[tuple[UsedMesh, Fix | None]]] = {}
     for used in robot.mesh_names:
-        has_host = used.name.lower().startswith("file:") and not is_absolute(used.name)
-        if not (has_host or is_package_uri(used.name)) or is_missing(used):
+        is_package = is_package_uri(used.name)
+        is_file = used.name.lower().startswith("file:") and not is_absolute(used.name)
+        has_host = is_file and not is_package
+        if not (has_host or is_package) or is_missing(used):
             continue
         if is_folder(used.mesh.path):
             continue  # MSH006 reports it
@@ -180,7 +182,7 @@ def package_uri(robot: Facts) -> Violations:
 
 
 def _package_of(name: str) -> str:
-    match = re.match(r"(?:\w+:/+|\$\(\s*find\s+)([^/\\()\s]+)", name)
+    match = re.match(r"(?:\w+:/+)?(?:\$\(\s*find\s+)?([^/\\()\s]+)", name)
     return match.group(1) if match else name
 
 

@@ -143,9 +143,11 @@ def _primitives(body: Body) -> list[Geometry]:
 
 
 def _box(robot: Facts, side: MirrorSide) -> Matrix | None:
-    """Return the bounding box of collision shapes from the joint, in the axes of the trunk [m]."""
+    """Return the bounding box of collision shapes from the axis, in the axes of the trunk [m]."""
     box = box_at_zero(side.body, side.body.collisions, robot.meshes)
-    return None if box is None else box - side.point
+    # Exporters place a joint anywhere on its axis, so the point nearest to the trunk is used.
+    along = side.point - robot.mirror.offset * robot.mirror.normal
+    return None if box is None else box - (side.point - (along @ side.axis) * side.axis)
 
 
 def _visual_offset(robot: Facts, body: Body) -> float | None:

@@ -151,5 +151,5 @@ def rotation_in_degrees(robot: Facts) -> None:
 
     Source:
         http://wiki.ros.org/urdf/XML/link: rpy in radians. Angles of more than a turn are reported,
-        unless they are whole quarter turns.
+        unless they are multiples of 7.5 degrees.
     """
