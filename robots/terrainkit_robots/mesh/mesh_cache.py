@@ -344,7 +344,7 @@ class Meshes:
             return None
         head = self._bytes_of(path, _SAMPLE_BYTES)
         try:
-            points = _sample_points(header.format, head)
+            points = _sample_points(header, head)
         except MeshError:
             return None
         return points if len(points) > _MIN_SAMPLE_POINTS and np.isfinite(points).all() else None
@@ -354,21 +354,19 @@ _MIN_SAMPLE_POINTS = 20
 """Minimum number of vertices of a sample."""
 
 
-def _sample_points(mesh_format: Format, head: bytes) -> Points:
-    """Return the vertices in the first part of a file."""
-    if mesh_format == "stl":
+def _sample_points(header: Header, head: bytes) -> Points:
+    """Return the vertices in the first part of a file [m]."""
+    if header.format == "stl":
         faces = (len(head) - STL_HEADER) // STL_FACE
         return np.frombuffer(head, STL_RECORD, faces, STL_HEADER)["corners"].reshape(-1, 3)
-    if mesh_format == "obj":
+    if header.format == "obj":
         lines = re.findall(rb"^v[ \t]+(\S+[ \t]+\S+[ \t]+\S+)", head, re.MULTILINE)
         return parse_float_list(b" ".join(lines[:-1])).reshape(-1, 3)
     array = re.search(rb"<float_array[^>]*>([^<]*)", head)
     if array is None:
         return np.zeros((0, 3))
-    unit = re.search(rb"<unit[^>]*\bmeter=[\"']([0-9.eE+-]+)[\"']", head)
     values = parse_float_list(array[1].rpartition(b" ")[0])  # the last number may be truncated
-    factor = float(parse_float_list(unit[1])[0]) if unit else 1.0
-    return values[: values.size // 3 * 3].reshape(-1, 3) * factor
+    return values[: values.size // 3 * 3].reshape(-1, 3) * header.unit
 
 
 def _volume_factor(mesh: MeshFile) -> float:

@@ -6,7 +6,7 @@ The data itself is not read, so that a large visual mesh costs as little as a sm
 import os
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -64,6 +64,12 @@ class Header:
 
     problem: str = ""
     """What is wrong, as a sentence without its subject; empty if nothing is."""
+
+    unit: float = 1.0
+    """Unit of the coordinates that a COLLADA file states [m]."""
+
+    up_axis: str = ""
+    """Up axis that a COLLADA file states, such as Y_UP; empty if none."""
 
 
 def read_header(path: Path) -> Header:
@@ -153,7 +159,14 @@ def _dae(size: int, head: bytes, tail: bytes) -> Header:
         problem = "is not a COLLADA file: it does not start with a COLLADA element"
     elif re.search(rb"</COLLADA\s*>", tail) is None:
         problem = "is truncated: it does not end with </COLLADA>"
-    return _header("dae", size, problem)
+    header = _header("dae", size, problem)
+    unit = re.search(rb"<unit[^>]*\bmeter\s*=\s*[\"'](\d+\.?\d*(?:[eE]-?\d\d?)?)[\"']", head)
+    up_axis = re.search(rb"<up_axis>\s*([XYZ]_UP)", head)
+    return replace(
+        header,
+        unit=float(unit[1]) if unit else header.unit,
+        up_axis=up_axis[1].decode() if up_axis else header.up_axis,
+    )
 
 
 def _msh(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS

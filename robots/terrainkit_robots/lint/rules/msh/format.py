@@ -10,6 +10,7 @@ from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.msh.path import not_loaded
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
+from terrainkit_robots.text import names
 
 
 @rule("MSH005", "unsupported-format", "error", fixes="unsafe", onboarding="converts")
@@ -134,3 +135,37 @@ def lfs_pointer(robot: Facts) -> Violations:
                 severity=not_loaded(used),
                 measured={"bytes": used.header.size},
             )
+
+
+@rule("MSH017", "collada-frame", "note")
+def collada_frame(robot: Facts) -> Violations:
+    """COLLADA meshes have another unit than meters, or another up axis than z.
+
+    Programs read such a file differently. RViz, Gazebo Classic and PyBullet apply the unit;
+    trimesh, with which yourdfpy and Genesis read meshes, does not. PyBullet turns the mesh until
+    its up axis is z; the others keep the axes as they are. `onboard` applies the unit and keeps the
+    axes, as RViz does. A file that states neither is not reported.
+
+    Fix:
+        Export the mesh in meters with z up, or convert it to OBJ or STL as RViz shows it.
+
+    Source:
+        Bullet: LoadMeshFromCollada.cpp; trimesh: exchange/dae.py; gazebosim/gazebo-classic#1305:
+        the tag up_axis is not read; ros-visualization/rviz#1045.
+    """
+    frames: dict[tuple[float, str], list[UsedMesh]] = {}
+    for used in robot.mesh_files:
+        unit, up_axis = used.header.unit, used.header.up_axis or "Z_UP"
+        if (unit, up_axis) != (1.0, "Z_UP"):
+            frames.setdefault((unit, up_axis), []).append(used)
+    for (unit, up_axis), members in frames.items():
+        yield Violation(
+            element=members[0],
+            message=f"unit and up axis of {names((used.name for used in members), 2)}: got "
+            f"{unit:g} m and {up_axis}; expected 1 m and Z_UP, since "
+            + " and ".join(
+                ["trimesh (Genesis, yourdfpy) ignores the unit"] * (unit != 1)
+                + ["PyBullet turns the mesh by 90 degrees"] * (up_axis != "Z_UP")
+            ),
+            measured={"unit": unit, "meshes": len(members)},
+        )
