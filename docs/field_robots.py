@@ -63,8 +63,7 @@ legs. {summary}
 The repositories were read without their files of 4 MiB and more, so that large visual meshes are
 missing (MSH001).
 
-The rows are of 2026-11-27, except the six that are rejected for INR005 and INR006 alone. They are
-of 2026-11-29, since when these errors prevent onboarding.
+All rows are of 2026-11-29.
 
 To reproduce the tables:
 
@@ -305,7 +304,7 @@ def page(found: Sequence[tuple[Robot, Outcome]], versions: dict[str, str]) -> It
         ),
         commits="\n".join(repositories),
         summary=f"{told}.\n{stood(tested)} of {len(tested)} tested robots stand; {others} stand "
-        "only with a controller and were not tested.",
+        "only with a controller, or have too many joints to simulate, and were not tested.",
     )
     for robot, o in found:
         notes = "; ".join(filter(None, (o.errors, robot.note)))
