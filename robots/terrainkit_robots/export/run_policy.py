@@ -54,7 +54,8 @@ def observe(command: Any, action: Any, rotation: Any, past: Any = None) -> Any:
     """
     terms = {"commands": command, "actions": action, "projected_gravity": -rotation[2]}
     terms |= {"dof_pos": data.qpos[qpos_index], "dof_vel": data.qvel[qvel_index]}
-    terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": rotation.T @ data.qvel[:3]}
+    turning = np.cross(data.qvel[3:6], config["robot"]["center"])
+    terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": rotation.T @ data.qvel[:3] + turning}
     if gait := config["gait"]:
         angle = 2 * np.pi * data.time / gait["period"]
         is_moving = command[:2].any() or abs(command[2]) >= gait["min_yaw_rate"]

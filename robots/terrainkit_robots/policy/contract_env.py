@@ -80,20 +80,25 @@ def _other_terms(robot: Robot) -> dict[str, ObservationTerm]:
 
     return {
         "running_gait_phase": ObservationTerm(running_phase),
-        "imu_lin_vel": ObservationTerm(
-            lambda env: env.state.base_lin_vel + np.cross(env.state.base_ang_vel, lever)
-        ),
+        "imu_lin_vel": ObservationTerm(lambda env: _velocity_at(env, lever)),
+        "frame_lin_vel": ObservationTerm(lambda env: _velocity_at(env, np.zeros(3, np.float32))),
         "xyzw_projected_gravity": ObservationTerm(
             lambda env: projected_gravity(np.roll(env.state.base_quat, 1, axis=1))
         ),
     }
 
 
+def _velocity_at(env: LeggedEnv, point: FloatArray) -> FloatArray:
+    """Return the velocity of a point on the base, shape (n, 3); all in its frame."""
+    return env.state.base_lin_vel + np.cross(env.state.base_ang_vel, point - env.scene.center)
+
+
 def _source(contract: Contract, term: ContractTerm, known: Sequence[str]) -> str:
     """Return the term of the environment that has the numbers of a contract's term."""
     name = own_name(contract.style, term.name, known)
-    is_imu = name == "base_lin_vel" and term.params.get("imu")
-    return "imu_lin_vel" if is_imu else _SOURCES.get(name, name)
+    if name == "base_lin_vel":
+        return "imu_lin_vel" if term.params.get("imu") else "frame_lin_vel"
+    return _SOURCES.get(name, name)
 
 
 class MappedPolicy:

@@ -429,7 +429,8 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     return {
         "format_version": FORMAT_VERSION,
         "terrainkit": __version__,
-        "robot": {name: getattr(robot.spec, name) for name in names},
+        "robot": {name: getattr(robot.spec, name) for name in names}
+        | {"center": env.scene.center.tolist()},
         "files": {"onnx": ONNX_FILE, "torchscript": TORCHSCRIPT_FILE, "mjcf": ROBOT_FILE},
         "formulas": _FORMULAS,
         "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},

@@ -213,11 +213,11 @@ class Gait:
         is_biped = len(foot_pos) == 2
         default = np.sqrt(leg_length / 9.81) * (BIPED_GAIT_PERIOD if is_biped else GAIT_PERIOD)
         self.period = default if cfg.gait_period is None else cfg.gait_period
-        x, left = foot_pos[:, 0], foot_pos[:, 1] > 0
-        in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side
-        # Neighbors on a side, and opposite feet, have opposite phases: a trot on four legs, a walk
-        # on two.
-        self.offset = 0.5 * ((in_front + left) % 2)
+        x, y = (foot_pos[:, :2] - foot_pos[:, :2].mean(axis=0)).T
+        ring = np.argsort(np.arctan2(y, x) % (2 * np.pi))  # from the left front foot, to the left
+        # Neighbors in the ring have opposite phases: a trot on four legs, a walk on two.
+        self.offset = np.zeros(len(foot_pos))
+        self.offset[ring[::2]] = 0.5
         self._swing_fraction = cfg.swing_fraction
         # Time constant of the mean velocity that is to track the command [s]. The sway of two legs
         # exceeds small commands, so that stepping in place would track them less than standing.

@@ -29,6 +29,9 @@ SOLE = "sole of "
 MAX_SPEED = 10.0
 """Speed that a robot does not exceed within a policy step [m/s]."""
 
+MIN_CENTER_OFFSET = 0.05
+"""Offset of the base's frame from the middle of the feet that is corrected, in leg lengths."""
+
 ALL_BITS = 0x7FFFFFFF
 """A `conaffinity` that matches every `contype`."""
 
@@ -87,7 +90,11 @@ class Scene:
         self.geoms = np.flatnonzero(collides(model) & of_robot)  # the robot's colliding geoms
         # At `default_qpos`, the position of each foot's site, and the distance from it down to the
         # lowest point of the foot [m], shapes (f, 3) and (f,).
-        self.foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
+        foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
+        # Point of the base whose position and velocity are the robot's, in its frame [m]. Some
+        # files have the frame beside the plane of symmetry, such as at the left hip.
+        self.center = np.array([0, _center_offset(foot_pos, robot.leg_length), 0], np.float32)
+        self.foot_pos = foot_pos - self.center
         self.hip_joints = _hip_joints(robot, model, self.default_qpos)
 
 
@@ -214,6 +221,12 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return foot_pos.astype(np.float32), np.array(depths, np.float32)
+
+
+def _center_offset(foot_pos: FloatArray, leg_length: float) -> float:
+    """Return how far left of the base's frame the middle of the feet is [m]; 0 if it is close."""
+    offset = float(foot_pos[:, 1].mean())
+    return offset if abs(offset) > MIN_CENTER_OFFSET * leg_length else 0.0
 
 
 def _hip_joints(robot: Robot, model: Any, default_qpos: Any) -> NDArray[np.int64]:

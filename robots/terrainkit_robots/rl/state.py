@@ -154,8 +154,10 @@ class Sensors:
         """
         sim, scene, dt = self._sim, self._sim.scene, self._dt
         qpos, qvel = sim.qpos[rows].astype(np.float32), sim.qvel[rows].astype(np.float32)
-        quat, pos = qpos[:, 3:7], qpos[:, :3]
-        lin_vel, ang_vel = quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
+        quat, ang_vel, center = qpos[:, 3:7], qvel[:, 3:6], scene.center
+        conjugate = quat * np.array([1, -1, -1, -1], np.float32)
+        pos = qpos[:, :3] + quat_rotate_inverse(conjugate, center)
+        lin_vel = quat_rotate_inverse(quat, qvel[:, :3]) + np.cross(ang_vel, center)
         dof_vel, foot_pos = qvel.take(scene.joint_qvel, 1), sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)

@@ -187,6 +187,8 @@ class TestGait:
         [
             (FEET, [0.5, 0, 0, 0.5], 2.3),  # a trot
             (FEET[:2], [0.5, 0], 3.0),
+            (FEET[:2] - [0, 1, 0], [0.5, 0], 3.0),  # the frame of the base is at the left foot
+            (np.add(FEET[1::-1], [0, 3, 0]), [0, 0.5], 3.0),
             (SIX, [0.5, 0, 0, 0.5, 0.5, 0], 2.3),  # tripods
         ],
     )

@@ -95,18 +95,21 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
     control = document["control_type"]
     default = Terrain()
     points = (scan or {}).get("points")
+    parts = document["observation"]["parts"]
+    is_beside = any(document["robot"]["center"]) and any(p["name"] == "base_lin_vel" for p in parts)
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),
         ("wheels", "velocity targets", "velocity" not in joints["drive"], "position targets"),
         ("action_scale", "joints without an action", action["joints"] == joints["name"], "none"),
         ("runner.rsl_rl", "a recurrent network", not document.get("recurrent"), "a network"),
+        ("base_lin_vel", "that of `robot.center`", not is_beside, "that of the base's frame"),
         ("terrain.measured_points", "another grid", points in (None, grid), "the default grid"),
     ):
         if not is_expressible:
             raise ExportError(f"{FORMATS[style]}: {name}: got {got}; expected {expected}")
     terms = []
-    for part in document["observation"]["parts"]:
+    for part in parts:
         name, offset = part["name"], part["offset"]
         is_pose = name == "dof_pos" and offset == joints["default_position"]
         if any(offset) and not is_pose and name != "height_scan":
