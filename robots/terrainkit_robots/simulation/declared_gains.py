@@ -1,8 +1,9 @@
 """Use the position gains that a file declares, if they can hold the robot in training.
 
 They are published with many MJCF files and in the ros2_control of URDF files. They are not used if
-explicit PD control would be unstable at the time step of training, or if a leg collapses. Joints
-with equal gains are judged together: many arms are stable only at shorter time steps than the legs.
+explicit PD control would be unstable at the time step of training, if a leg collapses, or if they
+are too slow to balance two legs. Joints with equal gains are judged together: many arms are stable
+only at shorter time steps than the legs.
 """
 
 import math
@@ -10,12 +11,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from terrainkit_robots.analysis.facts import Facts, cached_fact
+from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
+from terrainkit_robots.simulation.stiffness import balance_frequency
 from terrainkit_robots.simulation.time_step import joint_inertia, max_stable_time_step
 from terrainkit_robots.text import contrast
+
+_BALANCE_SHARE = 0.8
+"""Declared gains are used from this share of `balance_frequency` on."""
 
 _MAX_SAG = 1.0
 """Allowed error of a joint that holds a leg at the standing pose [rad], as in JNT028."""
@@ -57,6 +63,8 @@ def declared_gains(facts: Facts) -> DeclaredGains:
         if _MAX_SAG * gain.stiffness < (torque := abs(torques.get(name, 0.0))) < math.inf
     }
     legs = {joint.name for joint in facts.leg_joints}
+    if slow := _too_slow_to_balance(facts, {name: gains[name] for name in legs & gains.keys()}):
+        unused |= dict.fromkeys(legs & gains.keys(), slow)
     # Joints of one class of actuators, such as all knees, keep the same gains.
     group = {name: (gain.stiffness, gain.damping, name in legs) for name, gain in gains.items()}
     while True:
@@ -83,6 +91,21 @@ def standing_gains(facts: Facts) -> Mapping[str, Gain]:
         text = f"{gain.reason}; declared are {own.stiffness:g} and {own.damping:g}, but {why}"
         found[name] = replace(gain, reason=text)
     return found
+
+
+def _too_slow_to_balance(facts: Facts, gains: Mapping[str, Gain]) -> str | None:
+    """Return why the gains of the legs cannot balance a robot, if they cannot."""
+    if not gains or is_statically_stable(facts.legs):
+        return None
+    inertia = joint_inertia(make_sim_model(facts))
+    fastest = max(math.sqrt(g.stiffness / inertia[name].free) for name, g in gains.items())
+    expected = _BALANCE_SHARE * balance_frequency(facts)
+    if fastest >= expected:
+        return None
+    return (
+        f"no joint of the legs is faster than {fastest:.2g} rad/s (natural frequency); a policy "
+        f"that balances the robot needs {expected:.2g} rad/s"
+    )
 
 
 def _gain(joint: Joint, suggested: Gain, inertia: float) -> Gain:

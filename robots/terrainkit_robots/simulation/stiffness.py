@@ -50,6 +50,12 @@ _MAX_SAG = 0.02
 _MIN_FREQUENCY = 20.0
 """Natural frequency of a joint without load, such as a steering joint, at least [rad/s]."""
 
+_BALANCE_FREQUENCY = 3.0
+"""Natural frequency of a leg's joint without load over sqrt(g / leg length), at least, on two legs.
+A slower servo does not catch the robot, which tips over at that rate. It is 3.0 and 3.2 for Open
+Duck Mini and OP3, and 3 to 20 for larger robots that walk. MicroDuck, with 1.5, did not learn to
+walk (benchmarks/results/policies.md)."""
+
 _LEVER = 0.1
 """Lever at which a prismatic joint corresponds to a revolute one [m]: 1 rad is 0.1 m."""
 
@@ -111,10 +117,23 @@ def leg_gain_target(
         stiffness, min_error = _UPRIGHT_FACTOR * weight * length / count, _MIN_LEG_ERROR
         task = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs"
     required = [_RequiredStiffness(stiffness=stiffness, task=task, min_error=min_error)]
+    is_stable = is_statically_stable(facts.legs)
     holds_pose = gain_set == "stand" or units == PRISMATIC
-    if holds_pose and facts.stance is not None and is_statically_stable(facts.legs):
+    if holds_pose and facts.stance is not None and is_stable:
         required.append(_stance_stiffness(facts.stance.torques, sim, units))
+    if not is_stable and units != PRISMATIC:
+        frequency = balance_frequency(facts)
+        slowest = max(inertia[name].free for name in joints)
+        task = f"for a natural frequency of {frequency:.3g} rad/s, {_BALANCE_FREQUENCY:g} times "
+        task += "sqrt(g / leg length)"
+        required.append(_RequiredStiffness(stiffness=frequency**2 * slowest, task=task))
     return _make_target(sim, inertia, joints, required)
+
+
+def balance_frequency(facts: Facts) -> float:
+    """Return the natural frequency that joints of legs need to balance a robot [rad/s]."""
+    length = float(np.mean([leg.length for leg in facts.legs]))
+    return _BALANCE_FREQUENCY * math.sqrt(GRAVITY / length)
 
 
 def _stance_stiffness(

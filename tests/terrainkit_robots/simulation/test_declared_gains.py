@@ -2,6 +2,8 @@ import pytest
 
 from terrainkit_robots.simulation.declared_gains import declared_gains, standing_gains
 from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import make_sim_model
+from terrainkit_robots.simulation.time_step import joint_inertia
 from tests.tables import read_table
 
 PENDULUM = read_table(__file__, "pendulum")
@@ -45,6 +47,23 @@ def test_unstable_gains_are_not_used(pendulum, kv, used):
 def test_joints_with_equal_gains_are_judged_together(pendulum):
     facts = pendulum('kp="9" kv="4.1"', 'kp="9" kv="4.1"')
     assert list(declared_gains(facts).unused) == ["a", "b"]
+
+
+@pytest.mark.parametrize(("share", "used"), [(0.98, False), (1.02, True)])
+def test_gains_that_are_too_slow_to_balance_are_not_used(bundled, tmp_path, share, used):
+    def biped(kp):
+        motors = ("<motor name", f'<position kp="{kp:.9g}" kv="1" name')
+        return bundled("biped.xml", motors, tmp_path=tmp_path)
+
+    facts = biped(1.0)
+    inertia = joint_inertia(make_sim_model(facts))
+    lightest = min(inertia[joint.name].free for joint in facts.leg_joints)
+    length = sum(leg.length for leg in facts.legs) / 2
+    slowest = 2.4**2 * 9.81 / length * lightest  # 80 % of 3 sqrt(g / leg length)
+    unused = declared_gains(biped(share * slowest)).unused
+    assert {"balances the robot" in unused.get(joint.name, "") for joint in facts.leg_joints} == {
+        not used
+    }
 
 
 def test_file_without_gains(bundled):

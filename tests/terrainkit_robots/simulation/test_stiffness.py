@@ -64,21 +64,24 @@ def test_gravity_load_is_that_of_all_bodies_below_a_joint(kind):
 
 
 @pytest.mark.parametrize(
-    ("effort", "gain_set", "factor", "limit"),
+    ("effort", "gain_set", "factor", "inertia", "limit"),
     [
-        ("139", "stand", 1.5 / 2, 139),  # by its effort at 1 rad
-        ("900", "stand", 1.5 / 2, 900),
-        ("900", "train", 0.36, 900),
+        ("139", "stand", 1.5 / 2, 0.1, 139),  # by its effort at 1 rad
+        ("900", "stand", 1.5 / 2, 0.1, 900),
+        ("900", "train", 0.36, 0.1, 900),
+        ("900", "train", 0.36, 10, 1800),  # by its effort at 0.5 rad
+        ("300", "stand", 0.75, 10, 600),
     ],
 )
-def test_knees_of_a_biped_are_stiff_for_its_weight(effort, gain_set, factor, limit):
+def test_knees_of_a_biped_are_stiff_and_fast(effort, gain_set, factor, inertia, limit):
     file = bundled.urdf_path("biped")
     text = file.read_text().replace('effort="139"', f'effort="{effort}"')
     biped = Facts(load_robot(file, contents={file: text.encode()}))
     names = "left_knee_joint", "right_knee_joint"
-    heavy = {name: SimpleNamespace(free=10.0, locked=10.0) for name in names}
-    target = leg_gain_target(biped, make_sim_model(biped), heavy, names, gain_set)
+    both = {name: SimpleNamespace(free=inertia, locked=inertia) for name in names}
+    target = leg_gain_target(biped, make_sim_model(biped), both, names, gain_set)
     length = sum(leg.length for leg in biped.legs) / 2
-    expected = factor * biped.total_mass * 9.81 * length
+    # For its weight, and for a natural frequency of 3 sqrt(g / leg length).
+    expected = max(factor * biped.total_mass * 9.81 * length, 9 * 9.81 / length * inertia)
     assert (target.stiffness, target.joints) == (pytest.approx(min(expected, limit)), names)
     assert not target.extra_armature
