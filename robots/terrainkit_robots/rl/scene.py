@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.integrations.near_geoms import collides
+from terrainkit_robots.analysis.bodies.contact import MAX_SOLE_DEPTH
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
@@ -188,9 +189,7 @@ def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
     """Add the sensors, and return the range of each kind in sensordata."""
     spec, soles = robot.spec, [SOLE + foot for foot in robot.spec.feet]
     for foot in spec.feet:
-        geoms = [geom for geom in mjspec.body(foot).geoms if geom.contype or geom.conaffinity]
-        center = np.mean([geom.pos for geom in geoms], axis=0) if geoms else np.zeros(3)
-        mjspec.body(foot).add_site(name=SOLE + foot, pos=center, group=4)
+        mjspec.body(foot).add_site(name=SOLE + foot, group=4)
     sensor, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
     kinds = {
         "foot_position": (sensor.mjSENS_FRAMEPOS, site, soles),
@@ -211,16 +210,31 @@ def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
 
 
 def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the `foot_pos` and the `sole_depth` of a scene."""
+    """Move the site of each foot to the center of the geoms that touch the ground.
+
+    A file does not show where they are: frames of meshes may be far from them, and compiled models
+    have their centers.
+
+    Returns:
+        The `foot_pos`, of the frame of the base, and the `sole_depth` of a scene.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = default_qpos
     mujoco.mj_kinematics(model, data)
-    foot_pos = np.array([data.site(SOLE + foot).xpos for foot in robot.spec.feet])
-    depths = []
-    for foot, height in zip(robot.spec.feet, foot_pos[:, 2], strict=True):
-        geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
-        depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
-    return foot_pos.astype(np.float32), np.array(depths, np.float32)
+    positions, depths = [], []
+    for foot in robot.spec.feet:
+        body, site = model.body(foot).id, model.site(SOLE + foot).id
+        geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == body))
+        position, depth = data.xpos[body], 0.0
+        if len(geoms):
+            lowest = np.array([lowest_point(model, data, int(geom)) for geom in geoms])
+            position = data.geom_xpos[geoms[lowest <= lowest.min() + MAX_SOLE_DEPTH]].mean(axis=0)
+            depth = position[2] - lowest.min()
+        model.site_pos[site] = data.xmat[body].reshape(3, 3).T @ (position - data.xpos[body])
+        model.site_sameframe[site] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+        positions.append(position)
+        depths.append(depth)
+    return np.array(positions, np.float32), np.array(depths, np.float32)
 
 
 def _center_offset(foot_pos: FloatArray, leg_length: float) -> float:

@@ -52,6 +52,24 @@ def test_hip_joints_move_legs_sideways(request, nominal_task, name, hips):
     assert [robot.spec.joint_order[k] for k in found] == [f"{hip}_joint" for hip in hips]
 
 
+def test_sites_of_feet_are_at_the_geoms_that_touch_the_ground(scene_of, cart, tmp_path):
+    """The foot is a leg with a cube below it, whose mesh has its origin elsewhere."""
+    corners = [(x, y, z) for x in (1.0, 1.1) for y in (1.95, 2.05) for z in (3.0, 3.1)]
+    mesh = " ".join(f"{value:g}" for corner in corners for value in corner)
+    asset = f'<asset><mesh name="cube" vertex="{mesh}"/></asset><worldbody>'
+    text = cart.mjcf.read_text().replace("<worldbody>", asset, 1)
+    cube = 'type="mesh" mesh="cube" pos="-1 -2 -3.3"'
+    text = text.replace('type="sphere" pos="0 0 -0.2" size="0.03"', cube)
+    (tmp_path / "cart.xml").write_text(text)
+    scene = scene_of(Robot.from_spec(cart.spec, tmp_path))
+    np.testing.assert_allclose(scene.model.site("sole of front").pos, [0.05, 0, -0.25], atol=1e-6)
+    data = mujoco.MjData(scene.model)
+    data.qpos[:] = scene.default_qpos
+    mujoco.mj_forward(scene.model, data)
+    found = data.sensordata[scene.sensors["foot_position"]].reshape(-1, 3)
+    np.testing.assert_allclose(found - scene.center, scene.foot_pos, atol=1e-6)
+
+
 class TestActuators:
     def test_are_in_the_order_of_the_spec(self, scene, cart):
         model = scene.model
