@@ -96,7 +96,8 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
     default = Terrain()
     points = (scan or {}).get("points")
     parts = document["observation"]["parts"]
-    is_beside = any(document["robot"]["center"]) and any(p["name"] == "base_lin_vel" for p in parts)
+    center = document.get("robot", {}).get("center", ())  # none in files of version 0.1
+    is_beside = any(center) and any(part["name"] == "base_lin_vel" for part in parts)
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),
