@@ -47,6 +47,11 @@ data.qpos[qpos_index] = joints["default_position"]
 controlled = [config["joints"]["name"].index(name) for name in config["action"]["joints"]]
 
 
+def linear_velocity(rotation: Any) -> Any:
+    """Return the velocity of the center of the robot in the frame of the base."""
+    return rotation.T @ data.qvel[:3] + np.cross(data.qvel[3:6], config["robot"]["center"])
+
+
 def observe(command: Any, action: Any, rotation: Any, past: Any = None) -> Any:
     """Return the observation; the columns of `rotation` are the axes of the base.
 
@@ -54,8 +59,7 @@ def observe(command: Any, action: Any, rotation: Any, past: Any = None) -> Any:
     """
     terms = {"commands": command, "actions": action, "projected_gravity": -rotation[2]}
     terms |= {"dof_pos": data.qpos[qpos_index], "dof_vel": data.qvel[qvel_index]}
-    turning = np.cross(data.qvel[3:6], config["robot"]["center"])
-    terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": rotation.T @ data.qvel[:3] + turning}
+    terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": linear_velocity(rotation)}
     if gait := config["gait"]:
         angle = 2 * np.pi * data.time / gait["period"]
         is_moving = command[:2].any() or abs(command[2]) >= gait["min_yaw_rate"]
@@ -103,7 +107,7 @@ for _ in range(steps):
         data.qfrc_applied[qvel_index] = np.clip(torque, -joints["effort"], joints["effort"])
         mujoco.mj_step(model, data)
     mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])  # in place
-    velocity += [*(rotation.T @ data.qvel[:3])[:2], data.qvel[5]]
+    velocity += [*linear_velocity(rotation)[:2], data.qvel[5]]
     if rotation[2, 2] < 0.5:
         sys.exit(f"fell after {data.time:.2f} s")
     if args.viewer:

@@ -3,6 +3,7 @@
 The data itself is not read, so that a large visual mesh costs as little as a small one.
 """
 
+import math
 import os
 import re
 from collections.abc import Callable
@@ -160,11 +161,13 @@ def _dae(size: int, head: bytes, tail: bytes) -> Header:
     elif re.search(rb"</COLLADA\s*>", tail) is None:
         problem = "is truncated: it does not end with </COLLADA>"
     header = _header("dae", size, problem)
-    unit = re.search(rb"<unit[^>]*\bmeter\s*=\s*[\"'](\d+\.?\d*(?:[eE]-?\d\d?)?)[\"']", head)
+    number = rb"\+?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+    unit = re.search(rb"<unit[^>]*\bmeter\s*=\s*[\"']\s*(" + number + rb")\s*[\"']", head)
+    meters = float(unit[1]) if unit else 0.0
     up_axis = re.search(rb"<up_axis>\s*([XYZ]_UP)", head)
     return replace(
         header,
-        unit=float(unit[1]) if unit else header.unit,
+        unit=meters if 0 < meters < math.inf else header.unit,
         up_axis=up_axis[1].decode() if up_axis else header.up_axis,
     )
 

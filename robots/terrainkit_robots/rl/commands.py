@@ -215,7 +215,8 @@ class Gait:
         self.period = default if cfg.gait_period is None else cfg.gait_period
         x, y = (foot_pos[:, :2] - foot_pos[:, :2].mean(axis=0)).T
         ring = np.argsort(np.arctan2(y, x) % (2 * np.pi))  # from the left front foot, to the left
-        # Neighbors in the ring have opposite phases: a trot on four legs, a walk on two.
+        # Neighbors in the ring have opposite phases, except the first and last of an odd number: a
+        # trot on four legs, a walk on two.
         self.offset = np.zeros(len(foot_pos))
         self.offset[ring[::2]] = 0.5
         self._swing_fraction = cfg.swing_fraction

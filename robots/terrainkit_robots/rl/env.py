@@ -377,7 +377,7 @@ class LeggedEnv(VecEnv):
 
     def _update_commands(self) -> None:
         """Let commands follow headings and waypoints, and write them into the state."""
-        self.velocity_command.update(self.yaw, self.sim.qpos[:, :2].astype(np.float32))
+        self.velocity_command.update(self.yaw, self.state.base_pos[:, :2])
         if np.array_equal(self.commands, self.state.commands):
             return
         for name, values in self._command_state(slice(None)).items():

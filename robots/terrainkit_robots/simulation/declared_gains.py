@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.pd_gains import suggest_gains
@@ -95,11 +94,12 @@ def standing_gains(facts: Facts) -> Mapping[str, Gain]:
 
 def _too_slow_to_balance(facts: Facts, gains: Mapping[str, Gain]) -> str | None:
     """Return why the gains of the legs cannot balance a robot, if they cannot."""
-    if not gains or is_statically_stable(facts.legs):
+    sim = make_sim_model(facts)
+    expected = _BALANCE_SHARE * balance_frequency(facts, sim)
+    if not gains or not expected:
         return None
-    inertia = joint_inertia(make_sim_model(facts))
+    inertia = joint_inertia(sim)
     fastest = max(math.sqrt(g.stiffness / inertia[name].free) for name, g in gains.items())
-    expected = _BALANCE_SHARE * balance_frequency(facts)
     if fastest >= expected:
         return None
     return (

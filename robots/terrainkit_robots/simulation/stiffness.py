@@ -117,12 +117,11 @@ def leg_gain_target(
         stiffness, min_error = _UPRIGHT_FACTOR * weight * length / count, _MIN_LEG_ERROR
         task = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs"
     required = [_RequiredStiffness(stiffness=stiffness, task=task, min_error=min_error)]
-    is_stable = is_statically_stable(facts.legs)
     holds_pose = gain_set == "stand" or units == PRISMATIC
-    if holds_pose and facts.stance is not None and is_stable:
+    if holds_pose and facts.stance is not None and is_statically_stable(facts.legs):
         required.append(_stance_stiffness(facts.stance.torques, sim, units))
-    if not is_stable and units != PRISMATIC:
-        frequency = balance_frequency(facts)
+    frequency = balance_frequency(facts, sim)
+    if frequency and units != PRISMATIC:
         slowest = max(inertia[name].free for name in joints)
         task = f"for a natural frequency of {frequency:.3g} rad/s, {_BALANCE_FREQUENCY:g} times "
         task += "sqrt(g / leg length)"
@@ -130,8 +129,14 @@ def leg_gain_target(
     return _make_target(sim, inertia, joints, required)
 
 
-def balance_frequency(facts: Facts) -> float:
-    """Return the natural frequency that joints of legs need to balance a robot [rad/s]."""
+def balance_frequency(facts: Facts, sim: SimModel) -> float:
+    """Return the natural frequency that joints of legs need to balance a robot [rad/s].
+
+    It is 0 for a robot that stands by itself, on a fixed base, or on wheels, which balance it.
+    """
+    has_wheels = any("wheel" in leg.roles for leg in facts.legs)
+    if is_statically_stable(facts.legs) or has_wheels or not sim.base_dofs:
+        return 0.0
     length = float(np.mean([leg.length for leg in facts.legs]))
     return _BALANCE_FREQUENCY * math.sqrt(GRAVITY / length)
 

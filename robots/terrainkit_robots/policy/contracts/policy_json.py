@@ -5,8 +5,9 @@ from math import isclose
 from typing import Any
 
 import msgspec
+import numpy as np
 
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit_robots.policy.contracts.contract import (
     FORMATS,
     TERM_NAMES,
@@ -53,6 +54,11 @@ def check_policy_json(document: Mapping[str, Any], built: Mapping[str, Any]) -> 
     Raises:
         ConfigError: If a value differs.
     """
+    got, expected = (
+        table.get("robot", {}).get("center", [0.0, 0.0, 0.0]) for table in (document, built)
+    )
+    if not np.allclose(got, expected, atol=1e-4):
+        raise ConfigError(f"robot.center: got {got}; expected {expected}, the middle of the feet")
     for key in _COMPARED.split():
         expected = dict(_leaves(built[key], key))
         for place, got in _leaves(document.get(key, {}), key):
@@ -97,14 +103,14 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
     points = (scan or {}).get("points")
     parts = document["observation"]["parts"]
     center = document.get("robot", {}).get("center", ())  # none in files of version 0.1
-    is_beside = any(center) and any(part["name"] == "base_lin_vel" for part in parts)
+    of_center = {"base_lin_vel", "height_scan"} & {part["name"] for part in parts}
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),
         ("wheels", "velocity targets", "velocity" not in joints["drive"], "position targets"),
         ("action_scale", "joints without an action", action["joints"] == joints["name"], "none"),
         ("runner.rsl_rl", "a recurrent network", not document.get("recurrent"), "a network"),
-        ("base_lin_vel", "that of `robot.center`", not is_beside, "that of the base's frame"),
+        (listing(of_center), "of robot.center", not (any(center) and of_center), "of the frame"),
         ("terrain.measured_points", "another grid", points in (None, grid), "the default grid"),
     ):
         if not is_expressible:

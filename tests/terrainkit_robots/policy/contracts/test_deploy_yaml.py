@@ -1,3 +1,5 @@
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import yaml
@@ -6,9 +8,9 @@ from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.contracts.contract import MJLAB, UNITREE
 from terrainkit_robots.policy.contracts.deploy_yaml import read_yaml, write_deploy_yaml
 from terrainkit_robots.policy.contracts.mjlab_metadata import read_metadata, write_metadata
-from terrainkit_robots.policy.contracts.policy_json import to_contract
+from terrainkit_robots.policy.contracts.policy_json import check_policy_json, to_contract
 from terrainkit_robots.policy.export import describe_policy
-from terrainkit_robots.rl.config import Commands, Control, Env, Task
+from terrainkit_robots.rl.config import Commands, Control, Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Plane
 
@@ -125,6 +127,21 @@ def test_what_a_reader_would_misread_is_refused(quadruped):
     document = describe(quadruped, control=Control(control_type="T"))
     with pytest.raises(ExportError, match="control_type: got T; expected P"):
         to_contract(document, UNITREE)
+
+
+@pytest.mark.parametrize("observed", [True, False])
+def test_velocity_of_another_point_than_the_frame_is_refused(quadruped, observed):
+    document = describe(quadruped, observations=Observations(base_lin_vel=observed))
+    assert document["robot"]["center"] == [0, 0, 0]
+    to_contract(document, MJLAB)
+    document["robot"]["center"] = [0, -0.06, 0]
+    refused = pytest.raises(
+        ExportError, match=r"base_lin_vel: got of robot\.center; expected of the"
+    )
+    with refused if observed else nullcontext():
+        to_contract(document, MJLAB)
+    with pytest.raises(ConfigError, match=r"robot\.center: got \[0, -0\.06, 0\]; expected \[0"):
+        check_policy_json(document, describe(quadruped))
 
 
 def test_terms_that_differ_have_names_that_no_reader_knows(quadruped):
