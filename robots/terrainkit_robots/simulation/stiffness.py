@@ -132,10 +132,11 @@ def leg_gain_target(
 def balance_frequency(facts: Facts, sim: SimModel) -> float:
     """Return the natural frequency that joints of legs need to balance a robot [rad/s].
 
-    It is 0 for a robot that stands by itself, on a fixed base, or on wheels, which balance it.
+    It is 0 for a robot that nothing has to balance: without legs, with three or more, on a fixed
+    base, or on wheels.
     """
     has_wheels = any("wheel" in leg.roles for leg in facts.legs)
-    if is_statically_stable(facts.legs) or has_wheels or not sim.base_dofs:
+    if not facts.legs or is_statically_stable(facts.legs) or has_wheels or not sim.base_dofs:
         return 0.0
     length = float(np.mean([leg.length for leg in facts.legs]))
     return _BALANCE_FREQUENCY * math.sqrt(GRAVITY / length)
