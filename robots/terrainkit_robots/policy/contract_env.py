@@ -43,9 +43,10 @@ class ContractInterface(PolicyInterface):
 
     def observation_terms(self, env: LeggedEnv, groups: ObsTerms) -> dict[str, ObservationTerm]:
         """Return the raw terms of the first contract by terrainkit's names."""
-        known = {**groups["privileged"], **groups["policy"], **_other_terms(env.robot)}
+        known = {**groups["privileged"], **groups["policy"], **_other_terms()}
         history = known.pop("history", None)
         contract = self._contracts[0]
+        known["base_lin_vel"] = _velocity_term(contract, known["base_lin_vel"], env.robot)
         names = [_source(contract, term, [*known]) for term in contract.terms]
         if any(name.endswith("projected_gravity") for name in names):  # repairs exchange them
             names += ["projected_gravity", "xyzw_projected_gravity"]
@@ -71,33 +72,35 @@ class ContractInterface(PolicyInterface):
         return target
 
 
-def _other_terms(robot: Robot) -> dict[str, ObservationTerm]:
+def _other_terms() -> dict[str, ObservationTerm]:
     """Return the terms of other projects that differ from terrainkit's."""
-    lever = imu_position(robot)
 
     def running_phase(env: LeggedEnv) -> FloatArray:
         return env.gait.phases(env.steps_since_reset * env.cfg.dt, np.ones(env.num_envs, bool))[0]
 
     return {
         "running_gait_phase": ObservationTerm(running_phase),
-        "imu_lin_vel": ObservationTerm(lambda env: _velocity_at(env, lever)),
-        "frame_lin_vel": ObservationTerm(lambda env: _velocity_at(env, np.zeros(3, np.float32))),
         "xyzw_projected_gravity": ObservationTerm(
             lambda env: projected_gravity(np.roll(env.state.base_quat, 1, axis=1))
         ),
     }
 
 
-def _velocity_at(env: LeggedEnv, point: FloatArray) -> FloatArray:
-    """Return the velocity of a point on the base, shape (n, 3); all in its frame."""
-    return env.state.base_lin_vel + np.cross(env.state.base_ang_vel, point - env.scene.center)
+def _velocity_term(contract: Contract, own: ObservationTerm, robot: Robot) -> ObservationTerm:
+    """Return the velocity of the point that a contract means: the IMU, or the base's frame."""
+    has_imu = any(term.params.get("imu") for term in contract.terms)
+    point = imu_position(robot) if has_imu else np.zeros(3, np.float32)
+
+    def velocity(env: LeggedEnv) -> FloatArray:
+        lever = point - env.scene.center
+        return own.function(env) + np.cross(env.state.base_ang_vel, lever)
+
+    return replace(own, function=velocity)
 
 
 def _source(contract: Contract, term: ContractTerm, known: Sequence[str]) -> str:
     """Return the term of the environment that has the numbers of a contract's term."""
     name = own_name(contract.style, term.name, known)
-    if name == "base_lin_vel":
-        return "imu_lin_vel" if term.params.get("imu") else "frame_lin_vel"
     return _SOURCES.get(name, name)
 
 

@@ -87,6 +87,16 @@ def test_numbers_are_clipped_and_then_scaled(contract):
     np.testing.assert_allclose(position - pose, relative, atol=1e-6)
 
 
+@pytest.mark.parametrize("imu", [0.0, 1.0])
+def test_margins_find_the_velocity_that_a_policy_observes(contract, imu):
+    """They disturb the term `base_lin_vel`."""
+    term = ContractTerm(name="base_lin_vel", params={"imu": imu})
+    robot = Robot.load(get_task("quadruped").folder)
+    spec = make_spec(replace(contract, terms=(term,)), lambda obs: obs, robot, Task())
+    env = build_eval_env(spec, Plane(), 2, EvaluationConfig())
+    assert list(env.obs_terms["policy"]) == ["base_lin_vel"]
+
+
 def test_policies_may_move_some_joints_in_another_order(contract):
     names = "joints default_pose stiffness damping action_scale action_offset"
     order = [4, 1, 2, 5]
