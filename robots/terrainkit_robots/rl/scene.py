@@ -91,7 +91,7 @@ class Scene:
         self.geoms = np.flatnonzero(collides(model) & of_robot)  # the robot's colliding geoms
         # At `default_qpos`, the position of each foot's site, and the distance from it down to the
         # lowest point of the foot [m], shapes (f, 3) and (f,).
-        foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
+        foot_pos, self.sole_depth = _place_soles(robot, model, self.default_qpos)
         # Point of the base whose position and velocity are the robot's, in its frame [m]. Some
         # files have the frame beside the plane of symmetry, such as at the left hip.
         self.center = np.array([0, _center_offset(foot_pos, robot.leg_length), 0], np.float32)
@@ -209,7 +209,7 @@ def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
     return ranges
 
 
-def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArray, FloatArray]:
+def _place_soles(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArray, FloatArray]:
     """Move the site of each foot to the center of the geoms that touch the ground.
 
     A file does not show where they are: frames of meshes may be far from them, and compiled models

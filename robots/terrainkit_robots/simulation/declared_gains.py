@@ -16,7 +16,11 @@ from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.stiffness import balance_frequency
-from terrainkit_robots.simulation.time_step import joint_inertia, max_stable_time_step
+from terrainkit_robots.simulation.time_step import (
+    JointInertia,
+    joint_inertia,
+    max_stable_time_step,
+)
 from terrainkit_robots.text import contrast
 
 _BALANCE_SHARE = 0.8
@@ -62,8 +66,9 @@ def declared_gains(facts: Facts) -> DeclaredGains:
         if _MAX_SAG * gain.stiffness < (torque := abs(torques.get(name, 0.0))) < math.inf
     }
     legs = {joint.name for joint in facts.leg_joints}
-    if slow := _too_slow_to_balance(facts, {name: gains[name] for name in legs & gains.keys()}):
-        unused |= dict.fromkeys(legs & gains.keys(), slow)
+    of_legs = {name: gain for name, gain in gains.items() if name in legs}
+    if slow := _too_slow_to_balance(of_legs, inertia, balance_frequency(facts, sim)):
+        unused |= dict.fromkeys(of_legs, slow)
     # Joints of one class of actuators, such as all knees, keep the same gains.
     group = {name: (gain.stiffness, gain.damping, name in legs) for name, gain in gains.items()}
     while True:
@@ -92,14 +97,19 @@ def standing_gains(facts: Facts) -> Mapping[str, Gain]:
     return found
 
 
-def _too_slow_to_balance(facts: Facts, gains: Mapping[str, Gain]) -> str | None:
-    """Return why the gains of the legs cannot balance a robot, if they cannot."""
-    sim = make_sim_model(facts)
-    expected = _BALANCE_SHARE * balance_frequency(facts, sim)
-    if not gains or not expected:
-        return None
-    inertia = joint_inertia(sim)
-    fastest = max(math.sqrt(g.stiffness / inertia[name].free) for name, g in gains.items())
+def _too_slow_to_balance(
+    gains: Mapping[str, Gain], inertia: Mapping[str, JointInertia], frequency: float
+) -> str | None:
+    """Return why the gains of the legs cannot balance a robot, if they cannot.
+
+    Args:
+        gains: Gains of the joints of the legs.
+        inertia: Inertia of the joints.
+        frequency: The `balance_frequency` [rad/s].
+    """
+    expected = _BALANCE_SHARE * frequency
+    frequencies = [math.sqrt(gain.stiffness / inertia[name].free) for name, gain in gains.items()]
+    fastest = max(frequencies, default=math.inf)
     if fastest >= expected:
         return None
     return (

@@ -12,6 +12,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.legs import mean_length
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
 from terrainkit_robots.description.model import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.gain import GainSet
@@ -105,7 +106,7 @@ def leg_gain_target(
     """Return the target of joints of legs with the same role and units."""
     count = len(facts.legs)
     weight = float(sim.model.body_subtreemass[0]) * GRAVITY
-    length = float(np.mean([leg.length for leg in facts.legs]))
+    length = mean_length(facts.legs)
     units = sim.units(joints[0])
     if units == PRISMATIC:
         stiffness, min_error = weight / count / (_MAX_LEG_SAG * length), _MIN_ERROR
@@ -135,11 +136,10 @@ def balance_frequency(facts: Facts, sim: SimModel) -> float:
     It is 0 for a robot that nothing has to balance: without legs, with three or more, on a fixed
     base, or on wheels.
     """
-    has_wheels = any("wheel" in leg.roles for leg in facts.legs)
+    has_wheels = any(leg.limb.has_wheel for leg in facts.legs)
     if not facts.legs or is_statically_stable(facts.legs) or has_wheels or not sim.base_dofs:
         return 0.0
-    length = float(np.mean([leg.length for leg in facts.legs]))
-    return _BALANCE_FREQUENCY * math.sqrt(GRAVITY / length)
+    return _BALANCE_FREQUENCY * math.sqrt(GRAVITY / mean_length(facts.legs))
 
 
 def _stance_stiffness(

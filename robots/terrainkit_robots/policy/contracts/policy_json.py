@@ -103,7 +103,8 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
     points = (scan or {}).get("points")
     parts = document["observation"]["parts"]
     center = document.get("robot", {}).get("center", ())  # none in files of version 0.1
-    of_center = {"base_lin_vel", "height_scan"} & {part["name"] for part in parts}
+    names = [part["name"] for part in parts]
+    of_center = [name for name in names if name in ("base_lin_vel", "height_scan")]
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),
