@@ -78,13 +78,13 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
         "slope": (SLOPE, "30 degrees"),
         "friction": (RobotLimits.friction, "of the friction coefficient; a foot slides above 1"),
         "foothold": (FOOTHOLD * foot, f"{FOOTHOLD:g} x foot_radius ({foot:g} m)"),
-        "body_width": (width, "width of the collision shapes in the default pose"),
-        "standing_height": (height, "height of the collision shapes in the default pose"),
+        "body_width": (width, "width of the shapes in the default pose"),
+        "standing_height": (height, "height of the shapes in the default pose"),
         "crouched_height": (
             max(height - CROUCH * leg, height / 2),
             f"standing_height - {CROUCH:g} x {about_leg}, at least half of it",
         ),
-        "body_length": (length, "length of the collision shapes in the default pose"),
+        "body_length": (length, "length of the shapes in the default pose"),
     }
     is_wheel = (spec.joint_array("stiffness") == 0) & (spec.joint_array("damping") > 0)
     if np.count_nonzero(is_wheel) >= len(spec.feet):
@@ -119,9 +119,11 @@ def _length(spec: RobotSpec, name: str) -> float:
 
 
 def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float, float]:
-    """Return length, width and height of the collision shapes in the default pose [m].
+    """Return length, width and height of the robot in the default pose [m].
 
-    The last value is the height of the center of mass above their lowest point [m].
+    A body without collision shapes counts with its visual ones, since in many files for training
+    only the feet collide. The last value is the height of the center of mass above the lowest
+    point [m].
     """
     import mujoco
 
@@ -140,9 +142,11 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float, float]:
             raise ConfigError(f"mjcf of {spec.name}: {mjcf} has no joint {name}")
         data.qpos[model.jnt_qposadr[joint]] = position
     mujoco.mj_kinematics(model, data)
-    geoms = np.flatnonzero(collides(model) & (model.geom_bodyid > 0))
+    has_collision = np.bincount(model.geom_bodyid[collides(model)], minlength=model.nbody) > 0
+    is_shape = collides(model) | ~has_collision[model.geom_bodyid]
+    geoms = np.flatnonzero(is_shape & (model.geom_bodyid > 0))
     if not len(geoms):
-        raise ConfigError("mjcf: got a robot without collision geoms; expected at least one")
+        raise ConfigError("mjcf: got a robot without geoms; expected at least one")
     mujoco.mj_comPos(model, data)
     corners = box_corners(model, data, geoms)
     length, width, height = np.ptp(corners, axis=0).tolist()

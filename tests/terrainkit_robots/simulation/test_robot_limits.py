@@ -2,6 +2,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from terrainkit.errors import ConfigError
@@ -29,6 +30,21 @@ def test_overrides_replace_derived_limits():
     assert (derived.limits.gap, derived.reasons["gap"]) == (0.25, "given")
     with pytest.raises(ConfigError, match=r"step_up: got -1\.0"):
         derive_limits(FOLDER / "biped", {"step_up": -1.0})
+
+
+def test_a_robot_of_which_only_the_feet_collide_has_the_size_of_its_visual_shapes(tmp_path):
+    source = FOLDER / "quadruped"
+    shutil.copy(source / SPEC_FILE, tmp_path)
+    spec = RobotSpec.load(source / SPEC_FILE)
+    model = mujoco.MjSpec.from_file(str(source / spec.mjcf))
+    for geom in model.geoms:
+        if geom.type != mujoco.mjtGeom.mjGEOM_SPHERE:
+            geom.contype = geom.conaffinity = 0
+    (tmp_path / spec.mjcf).write_text(model.to_xml())
+    expected = derive_limits(source).limits
+    limits = derive_limits(tmp_path).limits
+    assert limits.standing_height == pytest.approx(expected.standing_height, abs=0.01)
+    assert limits.body_width == pytest.approx(expected.body_width, abs=0.01)
 
 
 def test_wheels_limit_steps_gaps_and_slopes(tmp_path):
