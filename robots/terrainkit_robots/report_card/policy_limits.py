@@ -26,11 +26,15 @@ TARGETS = (0.5, 0.5, 0.5, 0.9, 0.5, 0.9)
 """Success at which each round measures."""
 
 # Four obstacles in a row fit. A robot that creeps up a ramp runs out of time, unlike on 8 m.
-PATCH_SIZE = (12.0, 4.0)
-"""Size of the patches along x and y [m]."""
+PATCH_CELLS = (240, 80)
+"""Size of the patches along x and y in cells: 12 m x 4 m for legs of at least 0.3 m."""
 
 CELL = 0.05
-"""Distance between two height samples [m]."""
+"""Largest distance between two height samples [m]. All lengths of the patches shrink with it."""
+
+# A gap of a robot's limit is four cells wide, and a step is two cells long.
+CELLS_PER_LEG = 6
+"""Cells in the length of a shorter leg."""
 
 # Twice the default limit is a grade of 1.154, tan(49 degrees).
 SLOPE_THRESHOLD = 1.25
@@ -85,56 +89,88 @@ class LimitTest:
         return math.degrees(math.atan(value)) if self.unit == "degrees" else value
 
 
-def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
+def limit_cell(leg_length: float) -> float:
+    """Return the distance between two height samples [m] for a leg length [m], in whole mm."""
+    return min(CELL, max(round(leg_length / CELLS_PER_LEG, 3), 0.001))
+
+
+def limit_tests(limits: RobotLimits, cell: float = CELL) -> tuple[LimitTest, ...]:
     """Return the tests for a robot.
 
-    Steps, gaps and slopes are 0.1 to 2 times its limit; gaps are whole cells, of at most 2 m.
-    Corridors are 3 times (at most 1.5 m) to half of its width, and stones 8 times to half of its
-    foothold. Ceilings are at 1.2 times its standing height to a tenth of that below its crouched
-    height.
+    Steps, gaps and slopes are 0.1 to 2 times its limit; gaps are whole cells, at most 40.
+    Corridors are 3 times (at most 30 cells) to half of its width, and stones 8 times to half of
+    its foothold. Ceilings are at 1.2 times its standing height to a tenth of that below its
+    crouched height.
+
+    Args:
+        limits: The limits of the robot.
+        cell: Distance between two height samples [m]; see `limit_cell`.
     """
+    scale = cell / CELL
+
+    def lengths(**values: float) -> dict[str, float]:
+        return {name: scale * value for name, value in values.items()}
+
     steps = (0.1 * limits.step_up, 2 * limits.step_up)
     drops = (0.1 * limits.step_down, 2 * limits.step_down)
     slopes = (0.1 * limits.slope, 2 * limits.slope)
     rolls = (math.atan(slopes[0]), math.atan(slopes[1]))
-    lowest = max(limits.crouched_height - 0.1 * limits.standing_height, 0.02)
+    lowest = max(limits.crouched_height - 0.1 * limits.standing_height, 0.02 * scale)
     ceilings = (1.2 * limits.standing_height, lowest)
-    corridors = (min(3 * limits.body_width, 1.5), 0.5 * limits.body_width)
-    stones = (max(8 * limits.foothold, 0.1), 0.5 * limits.foothold)
-    fewest, most = (round(share * limits.gap / CELL) for share in (0.1, 2))
-    gaps = (CELL * max(fewest, 1), CELL * min(max(most, 2), 40))
+    corridors = (min(3 * limits.body_width, 1.5 * scale), 0.5 * limits.body_width)
+    stones = (max(8 * limits.foothold, 0.1 * scale), 0.5 * limits.foothold)
+    fewest, most = (round(share * limits.gap / cell) for share in (0.1, 2))
+    gaps = (cell * max(fewest, 1), cell * min(max(most, 2), 40))
     # A robot starts and ends on flat ground, and only the tested quantity changes.
-    ramps = {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0}
-    one_bar = {"start": 1.5, "max_depth": 0.4, "spacing": 6.0}
-    four_bars = {**one_bar, "spacing": 2.0}
-    one_gap = {"start": 1.5, "depth": 5.0, "min_spacing": 6.0, "max_spacing": 6.0}
-    four_gaps = {**one_gap, "min_spacing": 2.5, "max_spacing": 2.5}
-    level = {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
-    one_tread = {"platform": 2.0, "step_width": 1.0}
+    ramps = {"gap": 0.0, "offset": 0.0}
+    ramps |= lengths(start=1.5, width=1.2, spacing=2.0, depth=1.0, end=1.2)
+    one_bar = lengths(start=1.5, min_depth=0.1, max_depth=0.4, thickness=0.2, spacing=6.0)
+    four_bars = one_bar | lengths(spacing=2.0)
+    one_gap = lengths(start=1.5, depth=5.0, min_spacing=6.0, max_spacing=6.0)
+    four_gaps = one_gap | lengths(min_spacing=2.5, max_spacing=2.5)
+    level = lengths(platform=2.0) | {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
+    one_tread = lengths(platform=2.0, step_width=1.0)
     return (
-        LimitTest("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
+        LimitTest("step up", "step_up", "pit", "depth", steps, lengths(side=2.0)),
         LimitTest("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
-        LimitTest("stairs", "step_up", "stairs", "step_height", steps, {"landing": 3.5}),
+        LimitTest(
+            "stairs",
+            "step_up",
+            "stairs",
+            "step_height",
+            steps,
+            lengths(landing=3.5, step_width=0.31),
+        ),
         LimitTest("one gap", "gap", "gap_track", "length", gaps, one_gap),
         LimitTest("four gaps", "gap", "gap_track", "length", gaps, four_gaps),
-        LimitTest("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
+        LimitTest("slope up and down", "slope", "slope", "grade", slopes, lengths(landing=1.5)),
         LimitTest("slope across", "slope", "side_ramps", "roll", rolls, ramps),
         LimitTest("one bar", "crouched_height", "crawl", "clearance", ceilings, one_bar),
         LimitTest("four bars", "crouched_height", "crawl", "clearance", ceilings, four_bars),
         LimitTest("stone", "foothold", "stones_everywhere", "stone", stones, level),
-        LimitTest("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
+        LimitTest(
+            "corridor",
+            "body_width",
+            "maze",
+            "corridor",
+            corridors,
+            lengths(clearing=1.5, thickness=0.2),
+        ),
     )
 
 
-def limits_config(tests: Sequence[LimitTest], hardness: Sequence[float], seed: int) -> MapConfig:
+def limits_config(
+    tests: Sequence[LimitTest], hardness: Sequence[float], seed: int, cell: float = CELL
+) -> MapConfig:
     """Return the map of one patch for each test, at its hardness."""
     return MapConfig(
         terrains=tuple(t.sub_terrain(value) for t, value in zip(tests, hardness, strict=True)),
         rows=1,
         cols=len(tests),
-        patch_size=PATCH_SIZE,
-        cell=CELL,
-        border=2.0,
+        patch_size=(cell * PATCH_CELLS[0], cell * PATCH_CELLS[1]),
+        cell=cell,
+        border=40 * cell,
+        spawn_radius=10 * cell,
         slope_threshold=SLOPE_THRESHOLD,
         seed=seed,
     )
@@ -169,16 +205,25 @@ class LimitResult:
 
 def limit_rows(table: ResultTable[LimitResult]) -> list[tuple[str, ...]]:
     """Return the limits as rows of text with a header."""
+    leg_length = table.about["leg_length"]
+    length_unit = "cm" if limit_cell(leg_length) == CELL else "mm"
     rows: list[tuple[str, ...]] = []
-    rows.append(("test", "90 % cross", "50 % cross", "crossed", "limit of the robot"))
+    header = ("test", "90 % cross", "50 % cross", "in legs", "crossed", "limit of the robot")
+    rows.append(header)
     for result in table["limits"]:
-        unit = "degrees" if result.unit == "degrees" else "cm"
+        unit = "degrees" if result.unit == "degrees" else length_unit
+        factor = {"degrees": 1, "cm": 100, "mm": 1000}[unit]
         cells = []
         for values in (result.at_90, result.at_50):
-            estimate, low, high = (_bounded(value, result) for value in values)
+            estimate, low, high = (
+                _bounded(value, result, f"{factor * value:.1f}") for value in values
+            )
             cells.append(f"{estimate} {unit} ({low} to {high})")
-        counts = (f"{n}/{of} at {_number(value, result.unit)}" for value, n, of in result.counts)
-        limit = f"{_number(result.robot_limit, result.unit)} {unit}"
+        estimates = (result.at_90[0], result.at_50[0])
+        in_legs = (_bounded(value, result, f"{value / leg_length:.2f}") for value in estimates)
+        cells.append("" if unit == "degrees" else ", ".join(in_legs))
+        counts = (f"{n}/{of} at {factor * value:.1f}" for value, n, of in result.counts)
+        limit = f"{factor * result.robot_limit:.1f} {unit}"
         rows.append((result.test, *cells, ", ".join(counts), limit))
     return rows
 
@@ -203,7 +248,9 @@ def measure_limits(
         ConfigError: see `Crossing`.
         MemoryLimitError: if the simulations would not fit in memory.
     """
-    tests = limit_tests(limits)
+    leg_length = spec.robot.leg_length
+    cell = limit_cell(leg_length)
+    tests = limit_tests(limits, cell)
     columns = np.repeat(np.arange(len(tests)), repetitions)
     hardness, crossed = np.empty((2, len(tests), 0))
     for number, share in enumerate(TARGETS):
@@ -213,7 +260,7 @@ def measure_limits(
         ]
         seed = config.seed + number
         # A map of these patches alone: the time of a step grows with the number of solids.
-        terrain_map = _generate(limits_config(tests, asked, seed))
+        terrain_map = _generate(limits_config(tests, asked, seed, cell))
         crossing = Crossing(spec, terrain_map, len(columns), replace(config, seed=seed))
         outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
         counted = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
@@ -227,6 +274,7 @@ def measure_limits(
         "checkpoint": spec.policy_name,
         "repetitions": repetitions,
         "seed": config.seed,
+        "leg_length": leg_length,
     }
     results = [
         _result(test, values, counts, repetitions, test.in_unit(getattr(limits, test.limit)))
@@ -262,14 +310,9 @@ def _generate(config: MapConfig) -> TerrainMap:
         return generate(config)
 
 
-def _bounded(value: float, result: LimitResult) -> str:
-    """Return an estimate as text; the ends of the tested values are bounds."""
+def _bounded(value: float, result: LimitResult, text: str) -> str:
+    """Return the text of an estimate; the ends of the tested values are bounds."""
     easiest, hardest = result.tested
     if value not in result.tested:
-        return _number(value, result.unit)
-    sign = ">" if (value == hardest) == (hardest > easiest) else "<"
-    return f"{sign} {_number(value, result.unit)}"
-
-
-def _number(value: float, unit: str) -> str:
-    return f"{value if unit == 'degrees' else 100 * value:.1f}"
+        return text
+    return f"{'>' if (value == hardest) == (hardest > easiest) else '<'} {text}"

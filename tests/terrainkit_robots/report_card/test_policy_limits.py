@@ -11,9 +11,12 @@ from tests.tables import read_table
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit_robots.policy.evaluate import EvaluationConfig
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.report_card import policy_limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
 from terrainkit_robots.report_card.policy_limits import (
+    LimitResult,
+    limit_cell,
     limit_rows,
     limit_tests,
     limits_config,
@@ -79,13 +82,18 @@ def test_limits_are_between_the_values_that_were_crossed_and_those_that_were_not
 
 def test_limits_beyond_the_tested_values_are_bounds(measure):
     rows = limit_rows(measure([1, -1] * 5 + [1]))
-    assert rows[0] == ("test", "90 % cross", "50 % cross", "crossed", "limit of the robot")
-    by_test = {row[0]: row[1:3] for row in rows}
-    assert by_test["step up"] == 2 * ("> 40.0 cm (> 40.0 to > 40.0)",)  # twice the limit of 20 cm
-    assert by_test["step down"] == 2 * ("< 2.5 cm (< 2.5 to < 2.5)",)
-    assert by_test["one bar"] == 2 * ("> 72.0 cm (> 72.0 to > 72.0)",)  # not the highest one
+    header = ("test", "90 % cross", "50 % cross", "in legs", "crossed", "limit of the robot")
+    assert rows[0] == header
+    by_test = {row[0]: row[1:4] for row in rows}
+    assert by_test["step up"][:2] == 2 * (
+        "> 40.0 cm (> 40.0 to > 40.0)",
+    )  # twice the limit of 20 cm
+    assert by_test["step down"][:2] == 2 * ("< 2.5 cm (< 2.5 to < 2.5)",)
+    assert by_test["one bar"][:2] == 2 * ("> 72.0 cm (> 72.0 to > 72.0)",)  # not the highest one
     assert by_test["corridor"][1] == "< 20.0 cm (< 20.0 to < 20.0)"  # also the narrowest one
-    assert rows[1][3] == "10/10 at 20.8, 10/10 at 36.6, 40/40 at 40.0"
+    assert by_test["slope across"][2] == ""
+    assert rows[1][3] == "> 0.89, > 0.89"  # 0.4 m of 0.448 m
+    assert rows[1][4] == "10/10 at 20.8, 10/10 at 36.6, 40/40 at 40.0"
 
 
 def test_lapses_do_not_move_the_limit(measure):
@@ -99,6 +107,46 @@ def test_limits_of_a_robot_with_long_legs():
     tests = limit_tests(dataclasses.replace(LIMITS, gap=1.2))[3:5]
     assert [test.values for test in tests] == [pytest.approx((0.1, 2.0))] * 2
     assert generate(limits_config(tests, [1, 1], 5)).difficulty.shape == (1, 2)
+
+
+@pytest.mark.parametrize("leg", [0.02, 0.1, 0.29])
+def test_patches_shrink_with_short_legs(leg):
+    """A robot with legs of 0.4 m and the same one, smaller, have the same limits in legs."""
+    lengths = {f.name: getattr(LIMITS, f.name) for f in dataclasses.fields(LIMITS)}
+    for name in ("slope", "friction", "turning_width"):
+        del lengths[name]
+    scaled = {name: value and value * leg / 0.4 for name, value in lengths.items()}
+    cell = limit_cell(leg)
+    tests = limit_tests(dataclasses.replace(LIMITS, **scaled), cell)
+    for large, small in zip(limit_tests(LIMITS), tests, strict=True):
+        if small.unit == "m":
+            rounding = 2 * cell if small.parameter in {"length", "corridor"} else 0.2 * cell
+            for value, size in zip(small.values, large.values, strict=True):
+                assert value == pytest.approx(size * leg / 0.4, abs=rounding)
+    for hardness in (0.0, 0.5, 1.0):
+        patches = generate(limits_config(tests, [hardness] * len(tests), 5, cell))
+        assert patches.difficulty.shape == (1, 11)
+
+
+def test_limits_of_a_small_robot_are_in_millimeters():
+    result = LimitResult(
+        test="step up",
+        unit="m",
+        tested=(0.004, 0.08),
+        at_90=(0.02, 0.01, 0.03),
+        at_50=(0.025, 0.02, 0.08),
+        counts=((0.02, 9, 10),),
+        robot_limit=0.04,
+    )
+    table = ResultTable(about={"leg_length": 0.1}, tables={"limits": [result]}, schema_version=2)
+    assert limit_rows(table)[1] == (
+        "step up",
+        "20.0 mm (10.0 to 30.0)",
+        "25.0 mm (20.0 to > 80.0)",
+        "0.20, 0.25",
+        "9/10 at 20.0",
+        "40.0 mm",
+    )
 
 
 def test_slopes_across_are_as_steep_as_slopes_up():
