@@ -70,7 +70,8 @@ class Crossing:
             got += f"{list(commands.ang_vel_yaw)}"
             raise ConfigError(f"commands: {got}; expected a task to walk ahead and turn both ways")
         start = replace(spec.task.init_state, position=START_OFFSET, yaw=START_YAW)
-        spec = replace(spec, task=replace(spec.task, init_state=start))
+        asset = replace(spec.task.asset, visual_collisions=True)
+        spec = replace(spec, task=replace(spec.task, init_state=start, asset=asset))
         collision = spec.task.terrain.collision
         terrain = MapGround(terrain_map, "auto" if collision == "plane" else collision)
         config = replace(config, seconds=3600.0)  # episodes have no time-out; attempts do

@@ -147,6 +147,9 @@ class Asset(Config):
     # Without self-collisions, friction loss and elliptic cones, a step takes half the time.
     self_collisions: bool = False
     """Whether the bodies of a robot collide with each other."""
+    visual_collisions: bool = False
+    """Whether bodies without collision shapes touch the terrain, as boxes around their visual
+    shapes. In many files only the feet collide, and the rest passes through obstacles."""
     joint_friction: bool = False
     """Whether to simulate dry joint friction; this takes a quarter of the speed."""
 

@@ -33,8 +33,8 @@ MAX_SPEED = 10.0
 MIN_CENTER_OFFSET = 0.05
 """Offset of the base's frame from the middle of the feet that is corrected, in leg lengths."""
 
-ALL_BITS = 0x7FFFFFFF
-"""A `conaffinity` that matches every `contype`."""
+GROUND_BIT, ROBOT_BIT, ALL_BITS = 1, 2, 0x7FFFFFFF
+"""The `contype` of terrain and robots, and a `conaffinity` that matches every `contype`."""
 
 
 class Scene:
@@ -69,6 +69,9 @@ class Scene:
                 self.model: Any = mjspec.compile()
             except ValueError as error:
                 raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
+            if task.asset.visual_collisions:
+                _add_boxes(mjspec.body(robot.spec.base), self.model)
+                self.model = mjspec.compile()
             self.near_geoms = None  # of the terrain, if the model has not all of them
             if not terrain.is_plane and not all_geoms:
                 move = MAX_SPEED * task.dt
@@ -156,9 +159,36 @@ def _set_joints_and_collisions(robot: Robot, base: Any, task: Task) -> None:
     for geom in base.find_all("geom"):
         if not geom.contype and not geom.conaffinity:
             continue
-        geom.contype, geom.conaffinity = int(task.asset.self_collisions), ALL_BITS
+        geom.contype = ROBOT_BIT if task.asset.self_collisions else 0
+        geom.conaffinity = ALL_BITS
         geom.condim = 3
         geom.priority = 1  # the robot's friction counts, not the larger of two
+
+
+def _add_boxes(base: Any, model: Any) -> None:
+    """Add boxes around the visual geoms of bodies that do not collide, which touch the ground.
+
+    Boxes, since flat meshes have no convex hull.
+    """
+    solid = set(model.geom_bodyid[collides(model)].tolist())
+    for geom in base.find_all("geom"):
+        if geom.parent.id in solid:
+            continue
+        center, size = np.split(model.geom_aabb[geom.id], 2)
+        quat, position = model.geom_quat[geom.id], np.zeros(3)
+        mujoco.mju_rotVecQuat(position, center, quat)
+        geom.parent.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=position + model.geom_pos[geom.id],
+            quat=quat,
+            size=np.maximum(size, 1e-3),
+            mass=0,
+            contype=0,
+            conaffinity=GROUND_BIT,
+            condim=3,
+            priority=1,
+            group=3,
+        )
 
 
 def _add_actuators(robot: Robot, mjspec: Any, task: Task) -> None:

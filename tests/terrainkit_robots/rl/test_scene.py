@@ -52,6 +52,31 @@ def test_hip_joints_move_legs_sideways(request, nominal_task, name, hips):
     assert [robot.spec.joint_order[k] for k in found] == [f"{hip}_joint" for hip in hips]
 
 
+def test_bodies_without_collision_shapes_touch_the_ground_alone(quadruped, nominal_task, tmp_path):
+    """Only the feet of this quadruped collide. Its base is below the ground."""
+    mjspec = mujoco.MjSpec.from_file(str(quadruped.mjcf))
+    for geom in mjspec.geoms:
+        if geom.parent.name not in quadruped.spec.feet:
+            geom.contype = geom.conaffinity = 0
+    (tmp_path / quadruped.mjcf.name).write_text(mjspec.to_xml())
+    (tmp_path / "robot.toml").write_text(quadruped.spec.to_toml())
+    robot, touching, masses = Robot.load(tmp_path), [], []
+    for visual_collisions in (False, True):
+        asset = Asset(visual_collisions=visual_collisions, self_collisions=True)
+        scene = Scene(robot, Plane(), nominal_task(asset=asset))
+        data = mujoco.MjData(scene.model)
+        data.qpos[:] = scene.default_qpos
+        mujoco.mj_forward(scene.model, data)
+        bodies = scene.model.geom_bodyid[data.contact.geom]
+        names = {frozenset(scene.model.body(body).name for body in pair) for pair in bodies}
+        assert all("world" in pair for pair in names)
+        touching.append(set().union(*names) - {"world"})
+        masses.append(scene.model.body_mass.sum())
+    assert touching[0] == set(robot.spec.feet)
+    assert touching[1] > {robot.spec.base, *robot.spec.feet}
+    assert masses[0] == masses[1]
+
+
 def test_sites_of_feet_are_at_the_geoms_that_touch_the_ground(scene_of, cart, tmp_path):
     """The foot is a leg with a cube below it, whose mesh has its origin elsewhere."""
     corners = [(x, y, z) for x in (1.0, 1.1) for y in (1.95, 2.05) for z in (3.0, 3.1)]
