@@ -104,60 +104,16 @@ def static_mesh(model: "mujoco.MjModel") -> "trimesh.Trimesh":
     import mujoco
     import trimesh
 
+    from terrainkit.importing.readers.mjcf_scene import geom_mesh
+
+    geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+    if not len(geoms):
+        raise ExportError("static geoms: got none; expected a terrain")
+    for geom in geoms.tolist():
+        kind = mujoco.mjtGeom(model.geom_type[geom])
+        if kind in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SDF):
+            name = kind.name.removeprefix("mjGEOM_").lower()
+            raise ExportError(f"static geom {geom}: got a {name}; expected a shape with a mesh")
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    meshes = []
-    for geom in np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0):
-        mesh = _geom_mesh(model, int(geom))
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
-        meshes.append(mesh.apply_transform(pose))
-    if not meshes:
-        raise ExportError("static geoms: got none; expected a terrain")
-    return trimesh.util.concatenate(meshes)
-
-
-def _geom_mesh(model: "mujoco.MjModel", geom: int) -> "trimesh.Trimesh":
-    """Return the mesh of a geom in its own frame."""
-    import mujoco
-    import trimesh
-    from trimesh import creation
-
-    size, kind, number = model.geom_size[geom], model.geom_type[geom], model.geom_dataid[geom]
-    match mujoco.mjtGeom(kind):
-        case mujoco.mjtGeom.mjGEOM_BOX:
-            return creation.box(extents=2 * size)
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return creation.cylinder(radius=size[0], height=2 * size[1])
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return creation.capsule(radius=size[0], height=2 * size[1])
-        case mujoco.mjtGeom.mjGEOM_SPHERE | mujoco.mjtGeom.mjGEOM_ELLIPSOID as shape:
-            is_sphere = shape == mujoco.mjtGeom.mjGEOM_SPHERE
-            return creation.icosphere().apply_scale(size[0] if is_sphere else size)
-        case mujoco.mjtGeom.mjGEOM_MESH:
-            mesh = model.mesh(number)
-            vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
-            faces = model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]
-            return trimesh.Trimesh(vertices, faces, process=False)
-        case mujoco.mjtGeom.mjGEOM_HFIELD:
-            return _hfield_mesh(model.hfield(number))
-        case other:
-            name = other.name.removeprefix("mjGEOM_").lower()
-            raise ExportError(f"static geom {geom}: got a {name}; expected a shape with a mesh")
-
-
-def _hfield_mesh(field: Any) -> "trimesh.Trimesh":
-    """Return the upper surface of a heightfield, whose rows are along y."""
-    import trimesh
-
-    rows, columns = int(field.nrow[0]), int(field.ncol[0])
-    half_x, half_y, height, _ = field.size
-    y, x = np.meshgrid(
-        np.linspace(-half_y, half_y, rows), np.linspace(-half_x, half_x, columns), indexing="ij"
-    )
-    vertices = np.stack([x, y, height * field.data.reshape(rows, columns)], axis=-1)
-    k = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]
-    halves = ((a, b, c), (a, c, d))
-    faces = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in halves])
-    return trimesh.Trimesh(vertices.reshape(-1, 3), faces, process=False)
+    return trimesh.Trimesh(**geom_mesh(model, data, geoms).arrays(), process=False)

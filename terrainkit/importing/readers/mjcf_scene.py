@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files.child_process import ProcessLimits
@@ -95,7 +96,8 @@ def _read_scene(_: Path, scene: MjcfText) -> dict[str, Any]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     moving_names = np.array([body.name for body in moving], dtype=str)
-    return {**_scene_mesh(model, data).arrays(), "moving": moving_names, "unit": 1.0}
+    arrays = geom_mesh(model, data, np.flatnonzero(model.geom_group == 1)).arrays()
+    return {**arrays, "moving": moving_names, "unit": 1.0}
 
 
 def _read_files(spec: Any, scene: MjcfText) -> None:
@@ -119,13 +121,19 @@ def _read_files(spec: Any, scene: MjcfText) -> None:
                 geom.pos[2] += lift
 
 
-def _scene_mesh(model: Any, data: Any) -> SceneMesh:
-    """Return the geoms in the frame of the world."""
+def geom_mesh(model: Any, data: Any, geoms: NDArray[np.int64]) -> SceneMesh:
+    """Return some geoms of a MuJoCo model in the frame of the world.
+
+    Args:
+        model: The compiled model.
+        data: Its data with the positions of the geoms.
+        geoms: Numbers of the geoms, shape (n,).
+    """
     from mujoco import mjtGeom as Geom
 
     scene = SceneMesh()
     shapes = unit_shapes(level=4 - sum(model.ngeom > number for number in _MANY_GEOMS))
-    for k in np.flatnonzero(model.geom_group == 1).tolist():
+    for k in geoms.tolist():
         kind = Geom(model.geom_type[k])
         size = model.geom_size[k]
         asset = model.geom_dataid[k]
