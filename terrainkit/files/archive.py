@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from terrainkit.errors import MapFileError, TerrainkitError
 from terrainkit.files.memory import check_memory
 
-MAX_HEADER_BYTES = 10_000
-"""Largest header that is read [bytes]; headers written by numpy take about a hundred."""
-
 MAX_TEXT_BYTES = 64 << 20
 """Largest string that is read [bytes]."""
 
@@ -57,21 +54,6 @@ def open_archive(path: str | Path) -> Iterator["Archive"]:
         raise MapFileError(f"{path}: not an .npz file, or truncated: {error}") from error
     with file:
         yield Archive(path, file)
-
-
-class _LimitedReader:
-    """The start of a file. numpy would read a header of any length that the file claims."""
-
-    def __init__(self, file: IO[bytes], limit: int) -> None:
-        self._file = file
-        self._left = limit
-
-    def read(self, size: int) -> bytes:
-        """Return the next `size` bytes, or raise ValueError beyond the limit."""
-        if size > self._left:
-            raise ValueError(f"its header is longer than {MAX_HEADER_BYTES} bytes")
-        self._left -= size
-        return self._file.read(size)
 
 
 class Archive:
@@ -125,15 +107,11 @@ class Archive:
         shape: tuple[int | None, ...],
         limit: int | None,
     ) -> None:
-        start: Any = _LimitedReader(member, MAX_HEADER_BYTES)
-        version = np.lib.format.read_magic(start)
-        read = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }
-        if version not in read:
+        version = np.lib.format.read_magic(member)
+        # Only longer headers than those of maps need version 2, whose headers can take gigabytes.
+        if version != (1, 0):
             raise MapFileError(f"{self.path}: {key} has an unknown .npy version {version}")
-        found, _, dtype = read[version](start)
+        found, _, dtype = np.lib.format.read_array_header_1_0(member)
         if (
             dtype.hasobject
             or not dtype.isnative
