@@ -22,7 +22,6 @@ from terrainkit.geometry.box_decomposition import (
     changes,
     flat_cells,
     merge_boxes,
-    neighborhood,
 )
 from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.geometry.mesh.closed import THICKNESS
@@ -504,6 +503,9 @@ def without_boxes(
         heights: Heights of the map [m], shape (nx, ny).
         decomposition: The boxes, and the cells that they cover.
     """
+    import cv2
+
     # A sample influences the cells around it, so it is lowered only if boxes cover all of them.
-    lowered = np.logical_and.reduce(neighborhood(decomposition.box_mask))
+    covered = decomposition.box_mask.astype(np.uint8)
+    lowered = cv2.erode(covered, np.ones((3, 3), dtype=np.uint8)) > 0
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)

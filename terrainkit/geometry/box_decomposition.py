@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,6 @@ nodes of MuJoCo's bounding volume hierarchy, all of which are tested for a robot
 Heights differ along x, with the difficulty, so that mostly level ground merges along it; along y,
 boxes of all heights merge, and fewer of them save more time."""
 
-_Cell = TypeVar("_Cell", bound=np.generic)
 _Cache = dict[tuple[tuple[int, ...], bytes, bytes], list[tuple[int, Span]]]
 
 
@@ -162,20 +161,6 @@ def _drop_patches_without_walls(
             has_wall = walls_x[i0 : i1 + 1, j0:j1].any() or walls_y[i0:i1, j0 : j1 + 1].any()
             if not (flat[patch].all() or has_wall):
                 flat[patch] = False
-
-
-def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
-    """Return the values shifted to each of the 3 x 3 neighbors.
-
-    Args:
-        values: Values, shape (nx, ny). They continue beyond the edges.
-
-    Returns:
-        Nine arrays of shape (nx, ny).
-    """
-    padded = np.pad(values, 1, mode="edge")
-    nx, ny = values.shape
-    return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
 
 
 def _decompose_block(

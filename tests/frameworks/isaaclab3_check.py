@@ -39,9 +39,9 @@ from isaaclab_newton.physics import MJWarpSolverCfg, NewtonCfg, NewtonCollisionP
 from isaaclab_tasks.core.velocity import mdp, velocity_env_cfg
 from pages import page_block
 from parkour import CONFIG, RADIUS, ball_starts, rest_error
+from scipy.ndimage import maximum_filter, minimum_filter
 
 import terrainkit
-from terrainkit.geometry.box_decomposition import neighborhood
 from terrainkit.integrations.isaaclab import terrain_importer_cfg
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
@@ -164,7 +164,7 @@ def place(env, positions):
 def flat_starts(terrain_map):
     """Return the positions of balls over flat spots of all heights [m], shape (16, 3)."""
     heights = terrain_map.heights
-    flat = np.all([each == heights for each in neighborhood(heights)], axis=0)
+    flat = maximum_filter(heights, 3) == minimum_filter(heights, 3)
     border = terrain_map.config.border_cells  # an episode would end on it
     flat[:border] = flat[-border:] = flat[:, :border] = flat[:, -border:] = False
     i, j = np.nonzero(flat)

@@ -7,7 +7,6 @@ from terrainkit.geometry.box_decomposition import (
     changes,
     decompose_boxes,
     merge_boxes,
-    neighborhood,
 )
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.ground_surface import surface_at
@@ -163,9 +162,7 @@ def test_merged_boxes_share_a_top_and_a_whole_side():
     assert sorted(merged.tolist()) == expected
 
 
-def test_changes_and_neighborhood_of_rows():
+def test_changes_of_rows():
     rows = np.array([[1, 2], [1, 2], [1, 3], [0, 3]])
     assert changes(rows).tolist() == [0, 2, 3, 4]
     assert changes(np.broadcast_to(rows[0], (4, 2))).tolist() == [0, 4]
-    around = [each[1, 0] for each in neighborhood(rows)]
-    assert around == [1, 1, 2, 1, 1, 2, 1, 1, 3]
