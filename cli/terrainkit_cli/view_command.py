@@ -38,6 +38,8 @@ from terrainkit_cli.training_extra import require_training
 if TYPE_CHECKING:
     import viser
 
+    from terrainkit_robots.rl.run import PolicySpec
+
 DEMO_POLICY = "quadruped_hard"
 """The bundled policy that the demo shows."""
 
@@ -250,37 +252,24 @@ class View(PluginCommand, ViewerCommand):
         require_training()
         if self.contract and not self.robot:
             raise ConfigError("--robot: missing; expected the robot of the policy")
+        from terrainkit_robots.viewer.show_policy import PolicyView
+
+        run: PolicySpec
         if self.robot:
-            from terrainkit_robots.policy.open_policy import open_policy as open_foreign
+            from terrainkit_robots.policy.open_policy import open_policy
             from terrainkit_robots.rl.tasks import robot_and_task
-            from terrainkit_robots.viewer.show_policy import PolicyView
 
             robot, task = robot_and_task(self.robot, self.task)
-            spec = open_foreign(Path(self.source), robot, self.contract, task)
-            return partial(PolicyView, run=spec, terrain=self.terrain or None)
-        return open_policy(self.source, self.checkpoint, self.terrain or None, self.task)
+            run = open_policy(Path(self.source), robot, self.contract, task)
+        else:
+            from terrainkit_robots.rl.run import open_run
+
+            run = open_run(self.source, self.checkpoint, self.task)
+        return partial(PolicyView, run=run, terrain=self.terrain or None)
 
 
 Show = Callable[["viser.ViserServer"], object]
 """A function that fills the scene. If what it returns has a method `run`, it never returns."""
-
-
-def open_policy(
-    source: str,
-    checkpoint: int | None = None,
-    terrain: str | None = None,
-    task: Path | None = None,
-) -> "Show":
-    """Return the function that shows a policy; see `View` for the arguments.
-
-    Raises:
-        ConfigError: if there is no such run or checkpoint.
-    """
-    from terrainkit_robots.rl.run import open_run
-    from terrainkit_robots.viewer.show_policy import PolicyView
-
-    run = open_run(source, checkpoint, task)
-    return partial(PolicyView, run=run, terrain=terrain)
 
 
 def open_page(address: str) -> None:

@@ -29,7 +29,10 @@ class MazeLayout:
         before, cells = {start: start}, [start]
         for i, j in cells:  # breadth first: the list grows while it is read
             if i == nx:
-                return np.array(_way_back(before, (i, j))[::-1])
+                path = [(i, j)]
+                while path[-1] != start:
+                    path.append(before[path[-1]])
+                return np.array(path[::-1])
             ways = {
                 (i, j + 1): j + 1 < ny and not self.walls_y[i, j + 1],
                 (i + 1, j): not self.walls_x[i + 1, j],
@@ -40,15 +43,6 @@ class MazeLayout:
             before |= dict.fromkeys(reached, (i, j))
             cells += reached
         return np.empty((0, 2), dtype=np.int64)
-
-
-def _way_back(
-    before: dict[tuple[int, int], tuple[int, int]], cell: tuple[int, int]
-) -> list[tuple[int, int]]:
-    path = [cell]
-    while before[path[-1]] != path[-1]:
-        path.append(before[path[-1]])
-    return path
 
 
 def sample_maze(shape: tuple[int, int], opened: float, rng: np.random.Generator) -> MazeLayout:
