@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import MAX_PER_AXIS
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import Goals, Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +71,7 @@ class SlotLane(Lane):
     def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
         """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal at the end of each slot."""
         return lane_goals(grid, self.slot_edges(grid)[1:])
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.lane import SlotLane, lane_goals
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain
+from terrainkit.terrain import Goals, Terrain
 
 
 class PitTerrain(Terrain):
@@ -63,9 +63,7 @@ class PitLane(SlotLane):
         edges = self.slot_edges(grid)
         return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal behind the pit."""
         return self.pit_goals(grid, [])
 

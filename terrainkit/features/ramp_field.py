@@ -11,7 +11,7 @@ from terrainkit.features.blocks import make_ramps, max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +30,7 @@ class RampField(FlatTerrain, Lane):
         rise = self.grade * self.ramp_size()[0] * self.high_corners(i, j)
         return make_ramps(lower, lower + np.array(self.ramp_size()), rise)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of the flat strip behind the ramps."""
         lower, _, _ = self._ramp_grid(grid)
         return lane_goals(grid, (lower[:, 0].max() + self.ramp_size()[0] + grid.upper[0]) / 2)

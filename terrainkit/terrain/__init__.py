@@ -1,5 +1,5 @@
 """Terrain types: the class `Terrain`, its parameters, overlays, the registry and presets."""
 
-from terrainkit.terrain.terrain import FlatTerrain, Terrain
+from terrainkit.terrain.terrain import FlatTerrain, Goals, Terrain
 
-__all__ = ["FlatTerrain", "Terrain"]
+__all__ = ["FlatTerrain", "Goals", "Terrain"]

@@ -22,6 +22,10 @@ from terrainkit.terrain.parameter import (
 from terrainkit.terrain.parameterized import Parameterized
 from terrainkit.terrain.patch_geometry import checked_heights
 
+Goals = NDArray[np.floating]
+"""Goals in their order: x, y, z [m] and heading [rad], shape (k, 4). A z of NaN stands for the
+ground."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Terrain(Parameterized, ABC):
@@ -160,9 +164,7 @@ class Terrain(Parameterized, ABC):
         """
         return ()
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator") -> Goals:
         """Return the goals in their order; by default none.
 
         The arguments are the same as in `solids`.

@@ -10,7 +10,7 @@ from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.pit_ground import PitLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,7 @@ class Beams(PitLane):
         yaw = self.yaw * (2 * rng.random(len(first)) - 1)
         return make_standing_boxes(center, size, 0.0, floor=-self.depth, yaw=yaw)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of each beam, and one behind the pit."""
         first, last = self._beams(grid, rng)
         return self.pit_goals(grid, (first + last) / 2)

@@ -11,7 +11,7 @@ from terrainkit.features.blocks import SINK, make_standing_boxes
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +63,7 @@ class Boxes(FlatTerrain):
             tilt=self.tilt * (2 * rng.random((len(xy), 2)) - 1)[box],
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on top of each box and pyramid, counterclockwise around the platform."""
         offset = self._boxes(grid, rng)[0] - grid.center
         angle = np.arctan2(offset[:, 1], offset[:, 0])

@@ -22,7 +22,7 @@ from terrainkit.features.lane import lane_spawn
 from terrainkit.features.stairway_parts import StairParts, StairSection, lay_out
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 MAX_STOREYS = 4
 """Largest number of storeys."""
@@ -139,9 +139,7 @@ class Building(FlatTerrain, Stairway):
         rotation = np.diag([1.0, -1.0 if is_mirrored else 1.0, 1.0])
         return Solids.concatenate(parts).transform(rotation, self._origin(grid, is_mirrored))
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return goals in the doors and on the landings up to a room on the top storey."""
         plans, is_mirrored, target = self._layout(grid, rng)
         entrance = Door(rooms=(-1, CORRIDOR), axis=0, x=0.0, y=self._corridor_y)

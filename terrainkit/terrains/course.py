@@ -16,7 +16,7 @@ from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.settings.type_hint import MAX_VALUE
-from terrainkit.terrain import Terrain, parameter, registry
+from terrainkit.terrain import Goals, Terrain, parameter, registry
 from terrainkit.terrain.parameter import Parameter, Range, Value, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 
@@ -166,9 +166,7 @@ class Course(Lane):
                     check_solids(solids[-1])
         return Solids.concatenate(solids)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of each platform except the spawn platform."""
         spans = [span for _, span in self._element_slices(grid, rng)]
         begin, end = [0, *(span.stop for span in spans)], [*(span.start for span in spans)]

@@ -10,7 +10,7 @@ from terrainkit.features.blocks import max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +46,7 @@ class Crawl(FlatTerrain, Lane):
         size = np.column_stack([depth, depth * 0 + grid.size[1], depth * 0 + self.thickness])
         return make_boxes(center, size)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of each gap behind a bar."""
         x, depth = self._bars(grid, rng)
         behind = x + self.max_depth + self.spacing

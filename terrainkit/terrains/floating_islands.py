@@ -11,7 +11,7 @@ from terrainkit.features.pit_ground import PitTerrain
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,9 +70,7 @@ class FloatingIslands(PitTerrain):
         )
         return Solids.concatenate([walkways, islands])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on each island from the platform to the farthest one."""
         xy, parent, distance = self._centers(grid, rng)
         path = [int(np.argmax(distance))]

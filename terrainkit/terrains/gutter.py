@@ -10,7 +10,7 @@ from terrainkit.features.blocks import make_ramps
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +51,6 @@ class Gutter(FlatTerrain, Lane):
             [(height, height, 0.0, 0.0), (0.0, 0.0, height, height)],
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal behind the gutter."""
         return lane_goals(grid, grid.upper[0] - self.end / 2)

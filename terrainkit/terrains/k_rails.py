@@ -12,7 +12,7 @@ from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 from terrainkit.terrain.parameter import MAX_COUNT
 
 
@@ -69,9 +69,7 @@ class KRails(Lane):
         down = up.transform(np.diag([-1.0, 1.0, 1.0]), (2 * ridge, 0.0, 0.0))
         return Solids.concatenate([up, down])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal behind the field."""
         first, ridge, _, _ = self._field(grid)
         return lane_goals(grid, (2 * ridge - first + grid.upper[0]) / 2)

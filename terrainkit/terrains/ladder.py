@@ -11,7 +11,7 @@ from terrainkit.features.blocks import SINK
 from terrainkit.features.lane import lane_goals, lane_spawn
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import Goals, Terrain, parameter
 from terrainkit.terrain.parameter import MAX_COUNT
 
 RAIL = 0.05
@@ -98,9 +98,7 @@ class Ladder(Terrain):
         down = up.transform(np.diag([-1.0, 1.0, 1.0]), (2 * grid.center[0], 0.0, 0.0))
         return Solids.concatenate([up, down])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on the deck and one behind the second ladder."""
         landing = grid.length(grid.cells(self.landing))
         return lane_goals(grid, [grid.center[0], grid.upper[0] - landing / 2])

@@ -11,7 +11,7 @@ from terrainkit.features.blocks import make_walls, max_number
 from terrainkit.features.maze_layout import MazeLayout, sample_maze
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,9 +58,7 @@ class Maze(FlatTerrain):
             parts.append(make_walls(axis, position, start - half, end + half, size))
         return Solids.concatenate(parts)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in each cell on the path, and one in the exit."""
         maze = self._sample(grid, rng)
         shape = np.array([maze.walls_y.shape[0], maze.walls_x.shape[1]])

@@ -11,7 +11,7 @@ from terrainkit.features.flight import Flight, Stairway
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +63,7 @@ class OpenStairs(FlatTerrain, Lane, Stairway):
         lower = np.column_stack([x0, low, top - self.thickness])
         return make_blocks(lower, np.column_stack([x1, high, top]))
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on the top, and one behind the stairs."""
         first, last, number = self._stairs(grid)
         goals = lane_goals(grid, [(first + last) / 2, (last + grid.upper[0]) / 2])

@@ -10,7 +10,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_walls, max_number
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,7 @@ class Rooms(FlatTerrain):
                 parts.append(make_walls(axis, middle, start.ravel(), end.ravel(), size))
         return Solids.concatenate(parts)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in each door from the room of the spawn toward high x."""
         (line, _, door), _ = self._lines(grid, rng)
         row = (door.shape[1] - 1) // 2

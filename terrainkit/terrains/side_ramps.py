@@ -10,7 +10,7 @@ from terrainkit.features.blocks import make_ramps
 from terrainkit.features.pit_ground import PitLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +65,7 @@ class SideRamps(PitLane):
             floor=-self.depth,
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of each ramp, and one behind the pit."""
         edges = self.slot_edges(grid)
         goals = self.pit_goals(grid, (edges[:-1] + self.gap + edges[1:]) / 2)

@@ -10,7 +10,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.features.curbside import Curbside
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +48,7 @@ class Sidewalk(Curbside):
             ]
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in the middle of the sidewalk and one behind it."""
         x = grid.lower[0] + grid.length((self.curb_cell(grid) + self._last(grid)) / 2)
         behind = grid.upper[0] - grid.length(grid.cells(self.end)) / 2

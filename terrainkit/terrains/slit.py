@@ -11,7 +11,7 @@ from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,7 @@ class Slit(FlatTerrain, Lane):
         size = np.column_stack([0 * low + self.depth, high - low])
         return make_standing_boxes(center, size, self.height)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal behind each opening."""
         edges, y = self._slots(grid, rng)
         goals = lane_goals(grid, edges[1:])

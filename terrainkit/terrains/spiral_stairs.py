@@ -11,7 +11,7 @@ from terrainkit.features.blocks import MAX_PER_AXIS, SINK
 from terrainkit.features.flight import Flight, Stairway
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders, make_hulls
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 _ARC_POINTS = 5
 """Points on the outer edge of a tread."""
@@ -83,9 +83,7 @@ class SpiralStairs(FlatTerrain, Stairway):
         column = make_cylinders([[x, y, length / 2 - SINK]], self.column, length)
         return Solids.concatenate([column, make_hulls(hulls)])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on every fourth tread and on the last, in the middle of the tread."""
         (x, y), angle = self._stairs(grid)
         treads = np.unique([*range(3, self.number, 4), self.number - 1])

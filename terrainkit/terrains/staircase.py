@@ -12,7 +12,7 @@ from terrainkit.features.lane import lane_goals, lane_spawn
 from terrainkit.features.stairway_parts import RAIL, WALL, StairParts, StairSection, lay_out
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import FlatTerrain, parameter
+from terrainkit.terrain import FlatTerrain, Goals, parameter
 
 MAX_TREADS = 30
 """Largest number of treads of a flight."""
@@ -106,9 +106,7 @@ class Staircase(FlatTerrain, Stairway):
             return Solids.concatenate([steps, parts.walls(self.wall)])
         return Solids.concatenate([steps, parts.rails(self.handrail)]) if self.handrail else steps
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on each landing, and one behind straight stairs."""
         parts = self._placed(grid, rng)
         if self.shape != "straight":

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.flight import Flight, Stairway
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,9 +76,7 @@ class StairsTurning(Stairway):
         ground[i : i + side, j : j + side] = self.riser * levels
         return ground
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on each landing, counterclockwise; the last is on the ground."""
         landing = grid.cells(self.landing)
         first = np.array(self._first_cell(grid)) + landing / 2

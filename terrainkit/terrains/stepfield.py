@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 _POSTS = 10
 """Posts along each side of a field."""
@@ -54,9 +54,7 @@ class Stepfield(Lane):
         ground[i : i + block.shape[0], j : j + block.shape[1]] = self.unit * block
         return ground
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal on a last post of each field but the last, and one behind the fields."""
         side, (nx, ny) = grid.cells(self.post), self._counts(grid)
         end = grid.cells(self.start) + _POSTS * side * np.arange(1, nx + 1)

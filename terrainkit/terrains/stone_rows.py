@@ -12,7 +12,7 @@ from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between, pit_bounds
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +63,7 @@ class StoneRows(Lane):
             lower, upper = np.vstack([lower, block]), np.vstack([upper, [*high, 0.0]])
         return make_blocks(lower, upper)
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal behind the pit."""
         return lane_goals(grid, grid.upper[0] - grid.length(grid.cells(self.start)) / 2)
 

@@ -11,7 +11,7 @@ from terrainkit.features.blocks import make_blocks, make_standing_boxes
 from terrainkit.features.curbside import Curbside
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import Goals, parameter
 
 _WALL = 0.2
 """Thickness of the front of the house [m]."""
@@ -83,9 +83,7 @@ class Street(Curbside):
             ]
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
+    def goals(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Goals:
         """Return a goal in front of the steps and one in front of the door."""
         y, _ = self._layout(grid, rng)
         x = self._steps_start(grid) - self.passage / 2, grid.upper[0] - _WALL - self.landing / 2
