@@ -36,7 +36,7 @@ from terrainkit.settings.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit.terrain import presets, registry
 from terrainkit.terrain.paper import Paper, get_paper, paper_names
 from terrainkit.terrain.sub_terrain import SubTerrain
-from terrainkit.terrain.terrain_docs import TerrainDoc, overlay_doc, parameter_texts, terrain_doc
+from terrainkit.terrain.terrain_docs import TerrainDoc, class_doc, parameter_texts
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.lint.rule import FAMILIES, TASK_FAMILIES, Rule, rules
 from terrainkit_robots.lint.settings import Settings
@@ -50,6 +50,8 @@ NOTE = "<!-- Written by docs/build.py: change the docstrings, not this file. -->
 
 
 def terrains_page() -> str:
+    terrains = [class_doc(name, registry.get_terrain(name)) for name in registry.terrain_names()]
+    overlays = [class_doc(name, registry.get_overlay(name)) for name in registry.overlay_names()]
     parts = [
         "# Terrains\n",
         NOTE,
@@ -60,14 +62,13 @@ def terrains_page() -> str:
         "cut off above its ground floor, cut off above the next floor, and whole.\n",
         "| terrain | range | description |",
         "|---|---|---|",
-        *(summary_row(terrain_doc(name)) for name in registry.terrain_names()),
+        *map(summary_row, terrains),
     ]
-    parts += ["", *(terrain_section(terrain_doc(name)) for name in registry.terrain_names())]
+    parts += ["", *map(terrain_section, terrains)]
     parts += [OVERLAYS, "| overlay | range | description |", "|---|---|---|"]
-    parts += [summary_row(overlay_doc(name)) for name in registry.overlay_names()]
-    for name in registry.overlay_names():
-        about = overlay_doc(name)
-        parts.append(f"\n### {name}\n\n{about.text}\n\n" + "\n".join(parameter_rows(about)))
+    parts += map(summary_row, overlays)
+    for about in overlays:
+        parts.append(f"\n### {about.name}\n\n{about.text}\n\n" + "\n".join(parameter_rows(about)))
     parts += ["\n## Presets\n", "| preset | columns |\n|---|---|"]
     for name in presets.preset_names():
         mix = ", ".join(

@@ -33,12 +33,7 @@ class List(PluginCommand):
 
     def run(self) -> int:
         """Print the terrains, overlays and presets, or the contents of one."""
-        from terrainkit.terrain.terrain_docs import (
-            overlay_doc,
-            overlay_summaries,
-            terrain_doc,
-            terrain_summaries,
-        )
+        from terrainkit.terrain.terrain_docs import class_doc, summary
 
         if self.papers:
             if self.terrain:
@@ -49,15 +44,17 @@ class List(PluginCommand):
             render.result("\nterrainkit list NAME shows all values, their source and what differs.")
             return 0
         if not self.terrain:
-            render.table(list(terrain_summaries().items()))
-            if names := (*registry.registered_terrains(), *registry.registered_overlays()):
+            terrains, overlays = registry.terrain_names(), registry.overlay_names()
+            render.table([(name, summary(registry.get_terrain(name))) for name in terrains])
+            groups = registry.TERRAINS, registry.OVERLAYS
+            if names := [name for group in groups for name in registry.registered_names(group)]:
                 render.result(f"\nregistered: {', '.join(names)}")
-            if others := registry.plugin_terrains():
+            if others := registry.plugins(registry.TERRAINS):
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
             render.result("\noverlays, which change any terrain:")
-            render.table([(f"  {name}", text) for name, text in overlay_summaries().items()])
-            if others := registry.plugin_overlays():
+            render.table([(f"  {name}", summary(registry.get_overlay(name))) for name in overlays])
+            if others := registry.plugins(registry.OVERLAYS):
                 render.result("\noverlays from other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
             mixes = (
@@ -76,12 +73,11 @@ class List(PluginCommand):
         if self.terrain in set(presets.preset_names()) - set(registry.terrain_names()):
             _print_preset(self.terrain)
             return 0
-        is_overlay = self.terrain in (*registry.overlay_names(), *registry.plugin_overlays())
-        about = (overlay_doc if is_overlay else terrain_doc)(self.terrain)
+        known = (*registry.overlay_names(), *registry.plugins(registry.OVERLAYS))
+        get_class = registry.get_overlay if self.terrain in known else registry.get_terrain
+        about = class_doc(self.terrain, get_class(self.terrain))
         render.result(f"{about.name}: {about.text}\n")
-        rows = [("parameter", "easy", "hard", "")]
-        rows += [(p.name, p.easy, p.hard, p.text) for p in about.parameters]
-        render.table(rows)
+        render.table([("parameter", "easy", "hard", ""), *about.parameters])
         return 0
 
 

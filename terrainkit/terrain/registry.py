@@ -30,7 +30,7 @@ _Overlay = TypeVar("_Overlay", bound=type[Overlay])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Group:
+class Group:
     """The classes of one parent."""
 
     label: str
@@ -44,8 +44,8 @@ class _Group:
     packages."""
 
 
-_TERRAINS = _Group(label="terrain", parent=Terrain, package="terrainkit.terrains")
-_OVERLAYS = _Group(label="overlay", parent=Overlay, package="terrainkit.overlays")
+TERRAINS = Group(label="terrain", parent=Terrain, package="terrainkit.terrains")
+OVERLAYS = Group(label="overlay", parent=Overlay, package="terrainkit.overlays")
 
 _registered: dict[tuple[str, str], type[Any]] = {}
 """The classes that this process has registered, by label and name."""
@@ -53,47 +53,29 @@ _registered: dict[tuple[str, str], type[Any]] = {}
 
 def terrain_names() -> tuple[str, ...]:
     """Return the names of the built-in terrains in alphabetical order, without importing them."""
-    return _module_names(_TERRAINS)
+    return _module_names(TERRAINS)
 
 
 def overlay_names() -> tuple[str, ...]:
     """Return the names of the built-in overlays in alphabetical order, without importing them."""
-    return _module_names(_OVERLAYS)
+    return _module_names(OVERLAYS)
 
 
 @cache
-def _module_names(group: _Group) -> tuple[str, ...]:
+def _module_names(group: Group) -> tuple[str, ...]:
     package = importlib.import_module(group.package)
     return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__)))
 
 
-def plugin_terrains() -> dict[str, "EntryPoint"]:
-    """Return the entry points of terrains from other installed packages, by name."""
-    return _plugins(_TERRAINS)
-
-
-def plugin_overlays() -> dict[str, "EntryPoint"]:
-    """Return the entry points of overlays from other installed packages, by name."""
-    return _plugins(_OVERLAYS)
-
-
-def _plugins(group: _Group) -> dict[str, "EntryPoint"]:
+def plugins(group: Group) -> dict[str, "EntryPoint"]:
+    """Return the entry points of other installed packages, by name."""
     from importlib.metadata import entry_points
 
     return {point.name: point for point in entry_points(group=group.package)}
 
 
-def registered_terrains() -> tuple[str, ...]:
-    """Return the names of the terrains that this process has registered."""
-    return _registered_names(_TERRAINS)
-
-
-def registered_overlays() -> tuple[str, ...]:
-    """Return the names of the overlays that this process has registered."""
-    return _registered_names(_OVERLAYS)
-
-
-def _registered_names(group: _Group) -> tuple[str, ...]:
+def registered_names(group: Group) -> tuple[str, ...]:
+    """Return the names of the classes that this process has registered."""
     return tuple(name for label, name in _registered if label == group.label)
 
 
@@ -113,7 +95,7 @@ def register_terrain(terrain: _Terrain) -> _Terrain:
     Raises:
         ConfigError: if it is not a terrain, or another terrain has the name.
     """
-    _register(_TERRAINS, terrain)
+    _register(TERRAINS, terrain)
     return terrain
 
 
@@ -123,14 +105,14 @@ def register_overlay(overlay: _Overlay) -> _Overlay:
     Raises:
         ConfigError: if it is not an overlay, or another overlay has the name.
     """
-    _register(_OVERLAYS, overlay)
+    _register(OVERLAYS, overlay)
     return overlay
 
 
-def _register(group: _Group, item: Any) -> None:
+def _register(group: Group, item: Any) -> None:
     name = _checked_name(group, item)
     existing: Any = _registered.get((group.label, name))
-    if existing is None and (name in _module_names(group) or name in _plugins(group)):
+    if existing is None and (name in _module_names(group) or name in plugins(group)):
         existing = _get(group, name)
     if existing is None or _path(existing) == _path(item):
         if existing is not item:
@@ -143,7 +125,7 @@ def _register(group: _Group, item: Any) -> None:
         )
 
 
-def _checked_name(group: _Group, item: Any) -> str:
+def _checked_name(group: Group, item: Any) -> str:
     """Return the name of a class, after checking how it is declared."""
     is_subclass = isinstance(item, type) and issubclass(item, group.parent)
     if not is_subclass:
@@ -163,7 +145,7 @@ def plugin_name(item: type[Any]) -> str | None:
     """Return the name of a terrain or overlay class in errors; None if it is built in."""
     if is_built_in(item):
         return None
-    label = (_OVERLAYS if issubclass(item, Overlay) else _TERRAINS).label
+    label = (OVERLAYS if issubclass(item, Overlay) else TERRAINS).label
     return f"{label} {item.kind()} ({item.__module__}:{item.__qualname__})"
 
 
@@ -177,7 +159,7 @@ def get_terrain(name: str) -> type[Terrain]:
     Raises:
         ConfigError: if there is no such terrain, or a plugin cannot be loaded.
     """
-    return _get(_TERRAINS, name)  # type: ignore[no-any-return]
+    return _get(TERRAINS, name)  # type: ignore[no-any-return]
 
 
 def get_overlay(name: str) -> type[Overlay]:
@@ -186,25 +168,25 @@ def get_overlay(name: str) -> type[Overlay]:
     Raises:
         ConfigError: if there is no such overlay, or a plugin cannot be loaded.
     """
-    return _get(_OVERLAYS, name)  # type: ignore[no-any-return]
+    return _get(OVERLAYS, name)  # type: ignore[no-any-return]
 
 
 @cache
-def _get(group: _Group, name: str) -> Any:
+def _get(group: Group, name: str) -> Any:
     if name in _module_names(group):
         return _load_class(group, name)
     if (group.label, name) in _registered:
         return _registered[group.label, name]
-    plugins = _plugins(group)
-    if name not in plugins:
-        raise _unknown_name(group, name, plugins)
-    with plugin_errors(f"{group.label} {name} ({plugins[name].value}) cannot be loaded"):
-        found = plugins[name].load()
+    points = plugins(group)
+    if name not in points:
+        raise _unknown_name(group, name)
+    with plugin_errors(f"{group.label} {name} ({points[name].value}) cannot be loaded"):
+        found = points[name].load()
         _checked_name(group, found)
     return found
 
 
-def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> ConfigError:
+def _unknown_name(group: Group, name: str) -> ConfigError:
     base = name.removesuffix(INVERTED)
     if (
         base != name
@@ -212,7 +194,7 @@ def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> Confi
         and "inverted" in parameters_of(_get(group, base))
     ):
         return ConfigError(f"no {group.label} {name!r}; use {base} with inverted = true")
-    near = closest_names(name, [*_module_names(group), *plugins, *_registered_names(group)])
+    near = closest_names(name, [*_module_names(group), *plugins(group), *registered_names(group)])
     hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
     return ConfigError(
         f"no {group.label} {name!r} is built in, installed, or registered with --plugin FILE.py or "
@@ -236,7 +218,7 @@ def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
         return overlay(**parameters)
 
 
-def _load_class(group: _Group, name: str) -> type[Any]:
+def _load_class(group: Group, name: str) -> type[Any]:
     """Return the class in module `name` of the package of a group."""
     module = importlib.import_module(f"{group.package}.{name}")
     found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]

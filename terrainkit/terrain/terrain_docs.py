@@ -2,7 +2,7 @@
 
 import inspect
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from terrainkit.errors import plugin_errors
 from terrainkit.settings.field_docs import field_docs
@@ -11,8 +11,7 @@ from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterDoc:
+class ParameterDoc(NamedTuple):
     """The documentation of one parameter."""
 
     name: str
@@ -42,39 +41,13 @@ class TerrainDoc:
     """Its parameters, in order."""
 
 
-def terrain_summaries() -> dict[str, str]:
-    """Return the first line of each terrain's description, by name."""
-    return {name: _summary(registry.get_terrain(name)) for name in registry.terrain_names()}
-
-
-def overlay_summaries() -> dict[str, str]:
-    """Return the first line of each overlay's description, by name."""
-    return {name: _summary(registry.get_overlay(name)) for name in registry.overlay_names()}
-
-
-def terrain_doc(name: str) -> TerrainDoc:
-    """Return the documentation of the terrain `name`.
-
-    Raises:
-        ConfigError: if there is no such terrain.
-    """
-    return _class_doc(name, registry.get_terrain(name))
-
-
-def overlay_doc(name: str) -> TerrainDoc:
-    """Return the documentation of the overlay `name`.
-
-    Raises:
-        ConfigError: if there is no such overlay.
-    """
-    return _class_doc(name, registry.get_overlay(name))
-
-
-def _summary(kind: Any) -> str:
+def summary(kind: Any) -> str:
+    """Return the first line of the description of a terrain or overlay class."""
     return (inspect.getdoc(kind) or "").partition("\n")[0]
 
 
-def _class_doc(name: str, kind: Any) -> TerrainDoc:
+def class_doc(name: str, kind: Any) -> TerrainDoc:
+    """Return the documentation of a terrain or overlay class with a name."""
     with plugin_errors(registry.plugin_name(kind)):
         text = inspect.getdoc(kind) or ""
         texts = field_docs(kind)

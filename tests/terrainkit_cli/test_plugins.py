@@ -113,5 +113,5 @@ def test_map_of_a_class_in_the_docs(terrainkit, terrainkit_process, tmp_path):
             )
             assert "--plugin FILE.py" in again.stderr
             # Nothing but the option imports the file, which has the name of the class.
-            assert not registry.registered_terrains()
+            assert not registry.registered_names(registry.TERRAINS)
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "map.npz").read_bytes()

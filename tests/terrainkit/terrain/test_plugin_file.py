@@ -58,8 +58,8 @@ def test_load_plugin_registers_terrains_and_overlays(write):
     load_plugin(path)
     load_plugin(path.parent / ".." / path.parent.name / "bump.py")  # not a second time
     assert plugin_files() == (path,)
-    assert sorted(registry.registered_terrains()) == ["bump", "dip"]
-    assert registry.registered_overlays() == ("tilted",)
+    assert sorted(registry.registered_names(registry.TERRAINS)) == ["bump", "dip"]
+    assert registry.registered_names(registry.OVERLAYS) == ("tilted",)
     assert registry.plugin_name(registry.get_terrain("bump")) == "terrain bump (plugin_bump:Bump)"
     assert sys.path[-1] == str(path.parent)
 

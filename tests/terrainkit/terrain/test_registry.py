@@ -119,8 +119,8 @@ def test_get_terrain_loads_entry_point(plugin):
 def test_get_overlay_loads_entry_point(plugin):
     plugin("terrainkit.overlays.mirror:Mirror", "terrainkit.overlays")
     assert registry.get_overlay("dunes") is MIRROR
-    assert set(registry.plugin_overlays()) == {"dunes"}
-    assert registry.plugin_terrains() == {}
+    assert set(registry.plugins(registry.OVERLAYS)) == {"dunes"}
+    assert registry.plugins(registry.TERRAINS) == {}
     assert registry.make_overlay("dunes", {"axis": "x"}).axis == "x"
     with pytest.raises(ConfigError, match=r"dunes has no parameter 'axes'; did you mean 'axis'"):
         registry.make_overlay("dunes", {"axes": "x"})
@@ -144,7 +144,8 @@ def test_register_terrain_uses_the_class_name():
     ramp = make_ramp()
     assert registry.register_terrain(ramp) is registry.register_terrain(ramp) is ramp
     assert registry.get_terrain("ramp_up") is ramp
-    assert (registry.registered_terrains(), registry.registered_overlays()) == (("ramp_up",), ())
+    assert registry.registered_names(registry.TERRAINS) == ("ramp_up",)
+    assert registry.registered_names(registry.OVERLAYS) == ()
     (sub_terrain,) = MapConfig.from_toml('[[terrains]]\nterrain = "ramp_up"').sub_terrains
     assert sub_terrain.at(0.5) == ramp()
     assert sub_terrain.plugin == "terrain ramp_up (__main__:RampUp)"
@@ -161,7 +162,8 @@ def test_register_accepts_built_in():
     stairs = registry.get_terrain("stairs")
     assert SubTerrain(terrain=stairs) == SubTerrain(terrain="stairs")
     assert registry.register_overlay(MIRROR) is MIRROR
-    assert registry.registered_terrains() == registry.registered_overlays() == ()
+    assert not registry.registered_names(registry.TERRAINS)
+    assert not registry.registered_names(registry.OVERLAYS)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +204,8 @@ def test_register_overlay_replaces_class_defined_again():
     again = make_lift()
     assert registry.register_overlay(again) is again
     assert registry.get_overlay("lift") is again
-    assert (registry.registered_overlays(), registry.registered_terrains()) == (("lift",), ())
+    assert registry.registered_names(registry.OVERLAYS) == ("lift",)
+    assert registry.registered_names(registry.TERRAINS) == ()
     toml = '[[terrains]]\nterrain = "flat"\n[[terrains.overlays]]\noverlay = "lift"\nheight = 0.2'
     assert MapConfig.from_toml(toml).sub_terrains[0].overlays == (again(height=0.2),)
 
