@@ -232,7 +232,8 @@ def make_boxes(
     Raises:
         ConfigError: if shapes do not match, a value is not finite, or a size is below `MIN_SIZE`.
     """
-    return _make("boxes", center, np.asarray(size, float) / 2, rpy, friction, collides, visible)
+    half_size = np.asarray(size, float) / 2
+    return _make("boxes", (center, half_size, rpy), (friction, collides, visible))
 
 
 def make_cylinders(
@@ -262,7 +263,7 @@ def make_cylinders(
     """
     radius, length = np.broadcast_arrays(np.asarray(radius, float), np.asarray(length, float))
     half_size = np.stack([radius, radius, length / 2], axis=-1)
-    return _make("cylinders", center, half_size, rpy, friction, collides, visible)
+    return _make("cylinders", (center, half_size, rpy), (friction, collides, visible))
 
 
 def make_hulls(
@@ -359,20 +360,13 @@ def quaternions(rotation: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
 
 
-def _make(
-    kind: str,
-    center: ArrayLike,
-    half_size: ArrayLike,
-    rpy: ArrayLike,
-    friction: ArrayLike,
-    collides: ArrayLike,
-    visible: ArrayLike,
-) -> Solids:
-    vectors = [np.asarray(values, float) for values in (center, half_size, rpy)]
+def _make(kind: str, pose: Sequence[ArrayLike], flags: Sequence[ArrayLike]) -> Solids:
+    """Return shapes of one kind, given center, half size and rpy, and the flags of `_flags`."""
+    vectors = [np.asarray(values, float) for values in pose]
     vectors = [vector if vector.size else vector.reshape(-1, 3) for vector in vectors]
-    flags = [(np.size(values), 1) for values in (friction, collides, visible)]
+    numbers = [(np.size(values), 1) for values in flags]
     try:
-        n, _ = np.broadcast_shapes((1, 3), *(vector.shape for vector in vectors), *flags)
+        n, _ = np.broadcast_shapes((1, 3), *(vector.shape for vector in vectors), *numbers)
     except ValueError:
         given = ", ".join(str(vector.shape) for vector in vectors)
         raise ConfigError(
@@ -387,7 +381,7 @@ def _make(
             f"size of {kind}: got {2 * half_size.min():g} m; expected at least {MIN_SIZE:g} m"
         )
     shapes = np.hstack([center, half_size, _rpy_quaternions(rpy)]).astype(np.float32)
-    arrays = _flags(n, friction, collides, visible) | {kind: shapes}
+    arrays = _flags(n, *flags) | {kind: shapes}
     return replace(Solids.empty(), **arrays)
 
 
