@@ -1,7 +1,6 @@
 """The closed mesh: a surface with sides and a bottom."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 
@@ -34,8 +33,19 @@ def closed_mesh(surface: TriMesh, thickness: float = THICKNESS) -> TriMesh:
     foot = foot.reshape(-1) + len(vertices)
     start_foot, end_foot = foot[: len(start)], foot[len(start) :]
     middle = np.full(len(start), len(vertices) + len(rim))
+    # An edge has a wall at one end at most. The fan starts at the other end, which is a sample.
+    bent = below[start] != start
+    straight = ~bent
+    at_end = straight & (below[end] != end)
+    plain_end = np.where(at_end, below[end], end)
+    plain_start = np.where(bent, below[start], start)
     sides = [
-        *_side_faces(start, end, start_foot, end_foot, below),
+        np.column_stack([start, plain_start, end])[bent],
+        np.column_stack([plain_start, start_foot, end])[bent],
+        np.column_stack([end, start_foot, end_foot])[bent],
+        np.column_stack([start, plain_end, end])[at_end],
+        np.column_stack([start, end_foot, plain_end])[straight],
+        np.column_stack([start, start_foot, end_foot])[straight],
         np.column_stack([start_foot, end_foot, middle])[:, ::-1],
     ]
     bottom = float(vertices[:, 2].min()) - thickness
@@ -45,27 +55,3 @@ def closed_mesh(surface: TriMesh, thickness: float = THICKNESS) -> TriMesh:
         vertices=np.concatenate([vertices, extra.astype(np.float32)]),
         triangles=np.concatenate([triangles, *sides]).astype(np.int32),
     )
-
-
-def _side_faces(
-    start: NDArray[np.int64],
-    end: NDArray[np.int64],
-    start_foot: NDArray[np.int64],
-    end_foot: NDArray[np.int64],
-    below: NDArray[np.int64],
-) -> list[NDArray[np.int64]]:
-    """Return the faces between the boundary edges start -> end and their feet."""
-    # An edge has a wall at one end at most. The fan starts at the other end, which is a sample.
-    bent = below[start] != start
-    straight = ~bent
-    at_end = straight & (below[end] != end)
-    plain_end = np.where(at_end, below[end], end)
-    plain_start = np.where(bent, below[start], start)
-    return [
-        np.column_stack([start, plain_start, end])[bent],
-        np.column_stack([plain_start, start_foot, end])[bent],
-        np.column_stack([end, start_foot, end_foot])[bent],
-        np.column_stack([start, plain_end, end])[at_end],
-        np.column_stack([start, end_foot, plain_end])[straight],
-        np.column_stack([start, start_foot, end_foot])[straight],
-    ]

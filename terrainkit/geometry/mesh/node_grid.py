@@ -131,31 +131,27 @@ class NodeGrid:
         return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]])
 
     @cached_property
-    def edges_x(self) -> NDArray[np.int64]:
-        """Flat index into `walls_x` of each wall, in order."""
-        return np.flatnonzero(self.walls_x)
-
-    @cached_property
-    def edges_y(self) -> NDArray[np.int64]:
-        """Flat index into `walls_y` of each wall, in order."""
-        return np.flatnonzero(self.walls_y)
+    def edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Flat indices into `walls_x` and into `walls_y` of the walls, in order."""
+        return np.flatnonzero(self.walls_x), np.flatnonzero(self.walls_y)
 
     @property
     def vertex_count(self) -> int:
         """How many numbers the nodes and the midpoints of the walls take."""
-        return int(self.z.size + 2 * (self.edges_x.size + self.edges_y.size))
+        return int(self.z.size + 2 * sum(edges.size for edges in self.edges))
 
-    def midpoint_x(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the vertex at the midpoint of each wall (i, j)-(i + 1, j), on the side of (i, j).
+    def midpoint(self, axis: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex at the midpoint of each wall from (i, j), on the side of (i, j).
 
         The vertex on the other side has the next number. Without a wall, the result is undefined.
-        """
-        index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
-        return np.asarray(self.z.size + 2 * index)
 
-    def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
-        index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        Args:
+            axis: Direction of the edge, 0 for x or 1 for y.
+            i: Node along x, shape (n,).
+            j: Node along y, shape (n,).
+        """
+        number = i * (self.walls_x, self.walls_y)[axis].shape[1] + j
+        index = axis * self.edges[0].size + np.searchsorted(self.edges[axis], number)
         return np.asarray(self.z.size + 2 * index)
 
     def vertices(self, used: NDArray[np.bool_], extra: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -179,10 +175,10 @@ class NodeGrid:
 
     def midpoints(self) -> Iterator[NDArray[np.float32]]:
         """Yield the positions of all midpoints of walls [m], in the order of their numbers."""
-        sides = (self.edges_x, self.walls_x), (self.edges_y, self.walls_y)
-        for axis, (edges, walls) in enumerate(sides):
+        for axis, edges in enumerate(self.edges):
+            width = (self.walls_x, self.walls_y)[axis].shape[1]
             for start in range(0, edges.size, QUADS_PER_BLOCK):
-                i, j = np.divmod(edges[start : start + QUADS_PER_BLOCK], walls.shape[1])
+                i, j = np.divmod(edges[start : start + QUADS_PER_BLOCK], width)
                 end_i, end_j = (i, j + 1) if axis else (i + 1, j)
                 block = np.empty((len(i), 2, 3), dtype=np.float32)
                 block[:, :, 0] = ((self.x[i] + self.x[end_i]) / 2)[:, None]

@@ -87,8 +87,8 @@ class _Quads:
         i, j = np.divmod(numbers, node_grid.z.shape[1] - 1)
         corners = node_grid.corners(i, j)
         # Edges 0 and 1 point along x and y, edges 2 and 3 against them.
-        m0, m1 = node_grid.midpoint_x(i, j), node_grid.midpoint_y(i + 1, j)
-        m2, m3 = node_grid.midpoint_x(i, j + 1) + 1, node_grid.midpoint_y(i, j) + 1
+        m0, m1 = node_grid.midpoint(0, i, j), node_grid.midpoint(1, i + 1, j)
+        m2, m3 = node_grid.midpoint(0, i, j + 1) + 1, node_grid.midpoint(1, i, j) + 1
         midpoints = [m0, m0 + 1, m1, m1 + 1, m2, m2 - 1, m3, m3 - 1]
         x, y = node_grid.x, node_grid.y
         return cls(

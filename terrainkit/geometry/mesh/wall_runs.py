@@ -35,8 +35,8 @@ class WallRuns:
 
     def _midpoint(self, j: Ids) -> Ids:
         """Return the vertex at the midpoint of each wall at its node `j`, on the side of i."""
-        grid = self.node_grid
-        return grid.midpoint_y(j, self.i) if self.axis else grid.midpoint_x(self.i, j)
+        nodes = (j, self.i) if self.axis else (self.i, j)
+        return self.node_grid.midpoint(self.axis, *nodes)
 
     def keep_endpoints(self, kept: Mask) -> None:
         """Mark the nodes on both sides of both endpoints in `kept`."""
