@@ -122,13 +122,15 @@ def _write_glb(mesh: TriMesh, file: BinaryIO, extras: dict[str, float]) -> None:
     Raises:
         ExportError: if the file would exceed the size that its header can describe.
     """
+    vertices = np.ascontiguousarray(mesh.vertices, "<f4")
     # The indices are unsigned, and int32 has the same bytes.
-    arrays = [
-        np.ascontiguousarray(mesh.vertices, "<f4"),
-        np.ascontiguousarray(mesh.triangles, "<i4"),
-    ]
-    (num_vertices, _), (num_faces, _) = mesh.vertices.shape, mesh.triangles.shape
-    num_bytes = sum(array.nbytes for array in arrays)
+    triangles = np.ascontiguousarray(mesh.triangles, "<i4")
+    num_bytes = vertices.nbytes + triangles.nbytes
+    unsigned_int, single = 5125, 5126
+    bounds = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
+    positions = {"componentType": single, "count": len(vertices), "type": "VEC3", **bounds}
+    indices = {"componentType": unsigned_int, "count": triangles.size, "type": "SCALAR"}
+    second = {"byteOffset": vertices.nbytes, "byteLength": triangles.nbytes, "target": 34963}
     scene = {
         "asset": {"version": "2.0", "generator": "terrainkit"},
         "scene": 0,
@@ -137,30 +139,10 @@ def _write_glb(mesh: TriMesh, file: BinaryIO, extras: dict[str, float]) -> None:
         "meshes": [
             {"extras": extras, "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}
         ],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,  # float
-                "count": num_vertices,
-                "type": "VEC3",
-                "min": arrays[0].min(axis=0).tolist(),
-                "max": arrays[0].max(axis=0).tolist(),
-            },
-            {
-                "bufferView": 1,
-                "componentType": 5125,  # unsigned int
-                "count": 3 * num_faces,
-                "type": "SCALAR",
-            },
-        ],
+        "accessors": [{"bufferView": 0, **positions}, {"bufferView": 1, **indices}],
         "bufferViews": [
-            {"buffer": 0, "byteLength": arrays[0].nbytes, "target": 34962},
-            {
-                "buffer": 0,
-                "byteOffset": arrays[0].nbytes,
-                "byteLength": arrays[1].nbytes,
-                "target": 34963,
-            },
+            {"buffer": 0, "byteLength": vertices.nbytes, "target": 34962},
+            {"buffer": 0, **second},
         ],
         "buffers": [{"byteLength": num_bytes}],
     }
@@ -174,5 +156,5 @@ def _write_glb(mesh: TriMesh, file: BinaryIO, extras: dict[str, float]) -> None:
     file.write(struct.pack("<4sII", b"glTF", 2, total))
     file.write(struct.pack("<I4s", len(text), b"JSON") + text)
     file.write(struct.pack("<I4s", num_bytes, b"BIN\0"))
-    for array in arrays:
-        file.write(array.data)
+    file.write(vertices.data)
+    file.write(triangles.data)
