@@ -84,11 +84,8 @@ class _Reader:
         if root.tag == "sdf" and not parents:
             from terrainkit.importing.readers.sdf_text import SdfReader
 
-            sdf = SdfReader(self._parse)
-            root = sdf.translate(root, path)
-            self.scene.meshes, self.scene.images = sdf.meshes, sdf.images
-            self.scene.moving = sdf.moving
-            files = {*sdf.meshes.values(), *sdf.images.values()}
+            root = SdfReader(self._parse, self.scene).translate(root, path)
+            files = {*self.scene.meshes.values(), *self.scene.images.values()}
             self.scene.num_bytes += sum(file.stat().st_size for file in files)
         if root.tag != "mujoco":
             raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco> or <sdf>")

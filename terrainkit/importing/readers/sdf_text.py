@@ -6,13 +6,16 @@ Models that are not static are left out. Files of other places are never fetched
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, prefixed_errors
 from terrainkit.importing.readers.height_source import check_file
+
+if TYPE_CHECKING:
+    from terrainkit.importing.readers.mjcf_text import MjcfText
 
 _FOLDER_VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
 """Environment variables with the folders of models."""
@@ -36,19 +39,17 @@ _SIZES: dict[str, dict[str, float]] = {
 class SdfReader:
     """Translates the models of a world."""
 
-    def __init__(self, parse: Callable[[Path, tuple[Path, ...]], Any]) -> None:
+    def __init__(self, parse: Callable[[Path, tuple[Path, ...]], Any], scene: "MjcfText") -> None:
         """Create a reader.
 
         Args:
             parse: Returns the root of a document; its second argument are the documents around it.
+            scene: Gets the files of the world, and the models that are left out.
         """
         from lxml.etree import SubElement
 
-        self._parse = parse
+        self._parse, self._scene = parse, scene
         self._add = SubElement
-        self.meshes: dict[str, Path] = {}
-        self.images: dict[str, Path] = {}
-        self.moving: list[str] = []
 
     def translate(self, root: Any, path: Path) -> Any:
         """Return the MJCF scene of a document, whose meshes and heightfields have names only.
@@ -95,7 +96,7 @@ class SdfReader:
                 for collision in link.findall("collision"):
                     self._add_collision(frame, collision, files[-1].parent)
         elif model.tag == "model":
-            self.moving.append(model.get("name", ""))
+            self._scene.moving.append(model.get("name", ""))
 
     def _include(self, parent: Any, include: Any, files: tuple[Path, ...], is_static: bool) -> None:
         uri, pose = include.findtext("uri", "").strip(), include.find("pose")
@@ -140,14 +141,15 @@ class SdfReader:
                 raise HeightFileError(f"got a submesh of {file.name}; expected whole meshes")
             scale = shape.findtext("scale", "1 1 1")
             name = f"{file} {scale}"
-            if name not in self.meshes:
+            if name not in self._scene.meshes:
                 self._add(self._assets, "mesh", name=name, scale=scale)
-            self.meshes[name] = file
+            self._scene.meshes[name] = file
             geom.set("mesh", name)
         elif file.suffix.lower() in (".png", ".jpg", ".jpeg"):
-            name, sides = f"{file} {len(self.images)}", _numbers(shape, "size") * [0.5, 0.5, 1]
+            name = f"{file} {len(self._scene.images)}"
+            sides = _numbers(shape, "size") * [0.5, 0.5, 1]
             self._add(self._assets, "hfield", name=name, size=f"{_text(sides)} 1e-3")
-            self.images[name] = file
+            self._scene.images[name] = file
             geom.set("hfield", name)
             geom.set("pos", shape.findtext("pos", "0 0 0"))
         else:
