@@ -194,7 +194,7 @@ def _print_map(terrain_map: TerrainMap) -> None:
     facts = {
         "patches": f"{config.rows} x {config.cols} of {size_text(*config.patch_size)}",
         "samples": f"{grid.shape[0]} x {grid.shape[1]}, one every {config.cell:g} m",
-        "extent": f"{size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
+        "extent": f"{grid.extent}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
         "border": f"{config.border:g} m"
         + (f" at height {config.border_height:g} m" if config.border_height else ""),
         "heights": f"{heights.min():g} to {heights.max():g} m",

@@ -91,9 +91,8 @@ class Curbside(Lane):
         widest = max(self.ramp_width + 2 * self.flare, self.tree_grate) + _MARGIN
         if number < 1 or widest > self.spacing:
             raise ConfigError(
-                f"{self.kind()}: got spacing {self.spacing:g} m; expected at least {widest:g} m, "
-                "for the curb ramps and tree grates, and at most the width of the patch, "
-                f"{grid.size[1]:g} m"
+                f"{self._got('spacing')}; expected at least {widest:g} m, for the curb ramps and "
+                f"tree grates, and at most the width of the patch, {grid.size[1]:g} m"
             )
         return np.linspace(grid.lower[1], grid.upper[1], number + 1)
 

@@ -128,7 +128,6 @@ def pit_bounds(grid: Grid, start: float | None = None) -> tuple[NDArray[np.float
     if not (2 * margin < grid.shape).all():
         strips = "" if start is None else f"strips of {start:g} m at both ends and "
         raise ConfigError(
-            f"{strips}a rim of {grid.cell:g} m leave no pit in a patch of {grid.size[0]:g} m x "
-            f"{grid.size[1]:g} m"
+            f"{strips}a rim of {grid.cell:g} m leave no pit in a patch of {grid.extent}"
         )
     return np.array(grid.lower) + margin * grid.cell, np.array(grid.upper) - margin * grid.cell

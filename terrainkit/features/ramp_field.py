@@ -68,7 +68,7 @@ class RampField(FlatTerrain, Lane):
             raise ConfigError(
                 f"{name}: got elements of {size[0]:g} m x {size[1]:g} m between strips of "
                 f"{self.start:g} m and {self.end:g} m; expected elements that fit in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{grid.extent}"
             )
         i, j = (index.ravel() for index in np.indices((nx, ny)))
         x = grid.lower[0] + first + i * size[0]

@@ -37,6 +37,11 @@ class Grid:
         return self.shape[0] * self.cell, self.shape[1] * self.cell
 
     @property
+    def extent(self) -> str:
+        """Extent along x and y as text, such as `8 m x 6 m`."""
+        return f"{self.size[0]:g} m x {self.size[1]:g} m"
+
+    @property
     def upper(self) -> tuple[float, float]:
         """Corner of the last cell with the largest x and y [m]."""
         return self.lower[0] + self.size[0], self.lower[1] + self.size[1]

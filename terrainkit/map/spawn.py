@@ -133,8 +133,7 @@ class SpawnGround:
             raise ConfigError(
                 f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
                 f"{config.spawn_tolerance:g} m and free of solids up to "
-                f"{config.spawn_headroom:g} m in a patch of {grid.size[0]:g} m x "
-                f"{grid.size[1]:g} m; expected {expected}"
+                f"{config.spawn_headroom:g} m in a patch of {grid.extent}; expected {expected}"
             )
         return origin
 

@@ -33,10 +33,8 @@ class FrictionPatches(Overlay):
     def apply(self, patch: PatchGeometry, rng: np.random.Generator) -> PatchGeometry:
         """Give each square one of the coefficients."""
         if self.min_friction > self.max_friction:
-            raise ConfigError(
-                f"friction_patches: got min_friction {self.min_friction:g} and max_friction "
-                f"{self.max_friction:g}; expected min_friction <= max_friction"
-            )
+            got = self._got("min_friction", "max_friction")
+            raise ConfigError(f"{got}; expected min_friction <= max_friction")
         shape = patch.grid.shape
         cells = min(patch.grid.cells(self.side), max(shape))
         coefficients = np.linspace(self.min_friction, self.max_friction, self.levels)

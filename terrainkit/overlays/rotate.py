@@ -23,7 +23,6 @@ class Rotate(Overlay):
 
     def apply(self, patch: PatchGeometry, rng: np.random.Generator) -> PatchGeometry:
         """Rotate everything about the center of the patch."""
-        x, y = patch.grid.size
         is_square = patch.grid.shape[0] == patch.grid.shape[1]
         if self.degrees == "random":
             turns = int(rng.integers(4)) if is_square else 2 * int(rng.integers(2))
@@ -31,8 +30,8 @@ class Rotate(Overlay):
             turns = int(self.degrees) // 90
         if turns % 2 and not is_square:
             raise ConfigError(
-                f"rotate.degrees: got {self.degrees} on a patch of {x:g} m x {y:g} m; expected 180 "
-                "or a square patch"
+                f"rotate.degrees: got {self.degrees} on a patch of {patch.grid.extent}; expected "
+                "180 or a square patch"
             )
         quarter = np.array([[0, -1], [1, 0]])
         return patch.transform(np.linalg.matrix_power(quarter, turns))

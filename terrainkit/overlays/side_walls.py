@@ -41,8 +41,8 @@ class SideWalls(Overlay):
         grid = patch.grid
         if 2 * self.thickness >= grid.size[1]:
             raise ConfigError(
-                f"side_walls: got thickness {self.thickness:g} m; expected less than half of the "
-                f"patch, {grid.size[1]:g} m wide"
+                f"{self._got('thickness')}; expected less than half of the patch, "
+                f"{grid.size[1]:g} m wide"
             )
         if rng.random() >= self.probability:
             return patch

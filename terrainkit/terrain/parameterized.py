@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 from terrainkit.geometry.grid import Grid
+from terrainkit.settings.field_docs import field_docs
 from terrainkit.terrain.parameter import Parameter, Value, parameters_of
 
 _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -38,6 +39,21 @@ class Parameterized:
             if parameter.snap != "none":
                 realized[name] = parameter.realized(realized[name], grid)
         return realized
+
+    def _got(self, *names: str) -> str:
+        """Return values as the start of an error: `maze: got corridor 0.8 m and number 7`.
+
+        The unit of a value is the one that the docstring of the parameter states in brackets.
+        """
+        kind: Any = type(self)
+        docs = field_docs(kind)
+        texts = []
+        for name in names:
+            unit = re.search(r"\[(m|rad)\]", docs.get(name, ""))
+            texts.append(f"{name} {getattr(self, name):g}{f' {unit[1]}' if unit else ''}")
+        *first, last = texts
+        before = f"{', '.join(first)} and " if first else ""
+        return f"{self.kind()}: got {before}{last}"
 
 
 @cache

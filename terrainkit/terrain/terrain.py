@@ -106,17 +106,16 @@ class Terrain(Parameterized, ABC):
 
     def _check_fit(self, grid: Grid) -> None:
         """Raise ConfigError if a centered square of this terrain does not fit on `grid`."""
-        x, y = grid.size
         for name, parameter in parameters_of(type(self)).items():
             if parameter.snap != "centered":
                 continue
             value = getattr(self, name)
             counts = grid.centered(value)
             problem = ""
-            if value > min(x, y) + grid.cell / 2:
-                problem = f"does not fit in a patch of {x:g} m x {y:g} m"
+            if value > min(grid.size) + grid.cell / 2:
+                problem = f"does not fit in a patch of {grid.extent}"
             elif counts[0] >= grid.shape[0] and counts[1] >= grid.shape[1]:
-                problem = f"fills the whole patch of {x:g} m x {y:g} m"
+                problem = f"fills the whole patch of {grid.extent}"
             elif min(counts) == 0:
                 problem = f"is smaller than a cell; expected at least {grid.cell:g} m"
             if problem:

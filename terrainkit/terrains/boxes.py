@@ -83,8 +83,7 @@ class Boxes(FlatTerrain):
         xy, r = scatter(grid, rng, radius, number=self.number, gap=gap, platform=platform + gap)
         if not self.min_side <= self.max_side or not len(xy):
             raise ConfigError(
-                f"boxes: got min_side {self.min_side:g} m and max_side {self.max_side:g} m; "
-                f"expected min_side <= max_side, and a box that fits beside a platform of "
-                f"{self.platform:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('min_side', 'max_side')}; expected min_side <= max_side, and a box "
+                f"that fits beside a platform of {self.platform:g} m in a patch of {grid.extent}"
             )
         return xy, r

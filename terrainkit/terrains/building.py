@@ -213,7 +213,7 @@ class Building(FlatTerrain, Stairway):
                 f"{self.corridor:g} m; expected 1 to {MAX_STOREYS} storeys, sill < door_height < "
                 f"{max(0.0, self._storey - _SLAB):g} m, "
                 f"door < 0.85 room_size - {frame - self.door:g} m and stairs and a "
-                f"corridor that fit in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"corridor that fit in a patch of {grid.extent}"
             )
         return (
             x,

@@ -60,9 +60,9 @@ class Crawl(FlatTerrain, Lane):
         number = max_number("crawl", pitch, grid.size[0] - start)
         if self.min_depth > self.max_depth or not number:
             raise ConfigError(
-                f"crawl: got min_depth {self.min_depth:g} m, max_depth {self.max_depth:g} m and "
-                f"spacing {self.spacing:g} m; expected min_depth <= max_depth, and a bar that fits "
-                f"behind a start of {self.start:g} m in a patch {grid.size[0]:g} m long"
+                f"{self._got('min_depth', 'max_depth', 'spacing')}; expected min_depth <= "
+                "max_depth, and a bar that fits behind a start of "
+                f"{self.start:g} m in a patch {grid.size[0]:g} m long"
             )
         x = np.float64(grid.lower[0] + start) + np.arange(number) * pitch
         return x, self.min_depth + (self.max_depth - self.min_depth) * rng.random(number)

@@ -97,9 +97,8 @@ class FloatingIslands(PitTerrain):
         )
         if not len(xy) or self.walkway > self.radius:
             raise ConfigError(
-                f"floating_islands: got walkway {self.walkway:g} m, radius {self.radius:g} m and "
-                f"gap {self.gap:g} m; expected walkway <= radius, and an island that fits beside "
-                f"the platform in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('walkway', 'radius', 'gap')}; expected walkway <= radius, and an "
+                f"island that fits beside the platform in a patch of {grid.extent}"
             )
         xy = np.vstack([grid.center, xy])
         apart = np.sqrt(((xy[:, None] - xy) ** 2).sum(axis=-1))

@@ -41,9 +41,9 @@ class Gap(Terrain):
         width = grid.cells(self.width, minimum=0)
         if min(platform := self._cells(grid)) == 0:
             raise ConfigError(
-                f"gap: got width {self.width:g} m; expected at most "
+                f"{self._got('width')}; expected at most "
                 f"{grid.length(max(0, (min(grid.shape) - 3) // 2)):g} m, with ground on both sides "
-                f"in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"in a patch of {grid.extent}"
             )
         return grid.by_ring(platform, lambda k: np.where((k > 0) & (k <= width), -self.depth, 0.0))
 

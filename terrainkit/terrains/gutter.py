@@ -40,9 +40,8 @@ class Gutter(FlatTerrain, Lane):
         inner, outer = self.bottom / 2, self.width / 2
         if not (first < last and inner < outer <= grid.size[1] / 2 and self.roll < np.pi / 2):
             raise ConfigError(
-                f"gutter: got roll {self.roll:g} rad, bottom {self.bottom:g} m and width "
-                f"{self.width:g} m; expected a roll below 1.5708 rad, and bottom < width within a "
-                f"patch of {grid.size[0]:g} m x {grid.size[1]:g} m between start and end"
+                f"{self._got('roll', 'bottom', 'width')}; expected a roll below 1.5708 rad, and "
+                f"bottom < width within a patch of {grid.extent} between start and end"
             )
         height, y = (outer - inner) * np.tan(self.roll), grid.center[1]
         return make_ramps(

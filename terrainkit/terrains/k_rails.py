@@ -82,9 +82,8 @@ class KRails(Lane):
         ny = (grid.size[1] + 1e-9) / self.panel
         if not (nx >= 2 and ny >= 1 and nx * ny <= MAX_COUNT):
             raise ConfigError(
-                f"k_rails: got panel {self.panel:g} m; expected 2 to {MAX_COUNT} panels between a "
-                f"start of {self.start:g} m and an end of {self.end:g} m in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('panel')}; expected 2 to {MAX_COUNT} panels between a start of "
+                f"{self.start:g} m and an end of {self.end:g} m in a patch of {grid.extent}"
             )
         nx, ny = int(nx) // 2 * 2, int(ny)
         return grid.lower[0] + first, grid.lower[0] + first + nx // 2 * run, nx, ny

@@ -73,10 +73,9 @@ class Ladder(Terrain):
         number = self.height / self.rung_spacing
         if not (0.5 <= self.angle <= np.pi / 2 and run < landing and 1 <= number <= MAX_COUNT):
             raise ConfigError(
-                f"ladder: got angle {self.angle:g} rad, rung_spacing {self.rung_spacing:g} m and "
-                f"distance {self.distance:g} m; expected an angle of 0.5 rad to 1.57 rad, and "
-                f"a ladder with rungs in front of a deck {self.height:g} m high, on a landing of "
-                f"{self.landing:g} m"
+                f"{self._got('angle', 'rung_spacing', 'distance')}; expected an angle of 0.5 rad "
+                f"to 1.57 rad, and a ladder with rungs in front of a deck {self.height:g} m high, "
+                f"on a landing of {self.landing:g} m"
             )
         foot, slope = grid.lower[0] + landing - run, 1 / np.tan(self.angle)
         z = np.arange(1, int(number + 1e-9) + 1) * self.rung_spacing

@@ -79,9 +79,8 @@ class Maze(FlatTerrain):
         )
         if min(nx, ny) < 2:
             raise ConfigError(
-                f"maze: got corridor {self.corridor:g} m, thickness {self.thickness:g} m and "
-                f"number {self.number}; expected at least 2 x 2 cells that fit in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('corridor', 'thickness', 'number')}; expected at least 2 x 2 cells "
+                f"that fit in a patch of {grid.extent}"
             )
         maze = sample_maze((nx, ny), self.opened, rng)
         # Distances of the lines and of the cells from the center.

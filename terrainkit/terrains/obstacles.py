@@ -42,9 +42,8 @@ class Obstacles(Terrain):
         narrowest, widest = grid.cells(self.min_width), grid.cells(self.max_width)
         if not narrowest <= widest <= min(grid.shape):
             raise ConfigError(
-                f"obstacles: got min_width {self.min_width:g} m and max_width "
-                f"{self.max_width:g} m; expected min_width <= max_width <= the sides of the patch, "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('min_width', 'max_width')}; expected min_width <= max_width <= the "
+                f"sides of the patch, {grid.extent}"
             )
         draws = rng.random((self.number, 5))
         sides = narrowest + (draws[:, :2] * (widest - narrowest + 1)).astype(np.int64)

@@ -52,7 +52,7 @@ class Pallets(FlatTerrain):
         if not len(xy):
             raise ConfigError(
                 f"pallets: got a platform of {self.platform:g} m; expected one that leaves space "
-                f"for a pallet in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"for a pallet in a patch of {grid.extent}"
             )
         layers = 1 + (rng.random(len(xy)) * self.layers).astype(np.int64)
         yaw = np.pi * rng.random(len(xy))

@@ -57,8 +57,7 @@ class Poles(FlatTerrain):
             raise ConfigError(
                 f"poles: got widths {self.min_width:g} m to {self.max_width:g} m, heights "
                 f"{self.min_height:g} m to {self.max_height:g} m and gap {self.gap:g} m; expected "
-                "min <= max, and a pole that fits beside the platform in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"min <= max, and a pole that fits beside the platform in a patch of {grid.extent}"
             )
         height = self.min_height + (self.max_height - self.min_height) * rng.random(len(xy))
         center = np.column_stack([xy, (height - SINK) / 2])

@@ -40,8 +40,8 @@ class PyramidSlope(Terrain):
         run = min(grid.margin(platform)) - grid.cells(self.rim, minimum=0)
         if run <= 0:
             raise ConfigError(
-                f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch "
+                f"of {grid.extent}"
             )
         # Rings, unlike legged_gym's product of two ramps, have the requested grade everywhere.
         rise = grid.by_ring(platform, lambda k: self.grade * grid.cell * np.maximum(run - k, 0))

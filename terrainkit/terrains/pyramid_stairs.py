@@ -47,8 +47,7 @@ class PyramidStairs(Terrain):
         if risers < 1:
             raise ConfigError(
                 f"{self.kind()}: no step of {self.step_width:g} m fits between the platform of "
-                f"{self.platform:g} m and the edge of a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self.platform:g} m and the edge of a patch of {grid.extent}"
             )
         levels = self._levels(risers, rng)
         rise = grid.by_ring(platform, lambda k: levels[np.minimum(-(-k // width), risers)])

@@ -39,9 +39,9 @@ class Rails(FlatTerrain):
         distance = (grid.size - block) / (2 * (self.number + 1))
         if not self.width < distance.min():
             raise ConfigError(
-                f"rails: got width {self.width:g} m; expected less than their distance, "
-                f"{distance.min():g} m with {self.number} rails around a platform of "
-                f"{self.platform:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('width')}; expected less than their distance, {distance.min():g} m "
+                f"with {self.number} rails around a platform of {self.platform:g} m in a patch of "
+                f"{grid.extent}"
             )
         sides = block + 2 * distance * np.arange(1, self.number + 1)[:, None]
         frames = [

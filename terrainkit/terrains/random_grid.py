@@ -38,7 +38,7 @@ class RandomGrid(Terrain):
         if min(number) < 1:
             raise ConfigError(
                 f"{self.kind()}: no block of {self.block:g} m fits in a rim of {grid.cell:g} m in "
-                f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"a patch of {grid.extent}"
             )
         ground = np.zeros(grid.shape)
         extent = (number[0] * side, number[1] * side)

@@ -39,10 +39,8 @@ class RandomStairs(PyramidStairs):
     def _levels(self, number: int, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the heights of the platform and of the `number` treads around it [m]."""
         if self.min_step_height > self.step_height:
-            raise ConfigError(
-                f"random_stairs: got min_step_height {self.min_step_height:g} m and step_height "
-                f"{self.step_height:g} m; expected min_step_height <= step_height"
-            )
+            got = self._got("min_step_height", "step_height")
+            raise ConfigError(f"{got}; expected min_step_height <= step_height")
         share = rng.random(number)
         share = (share - share.min()) / np.ptp(share) if number > 1 else np.ones(1)
         rises = self.min_step_height + share * (self.step_height - self.min_step_height)

@@ -58,10 +58,8 @@ class Road(SlotLane):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and the potholes behind each speed bump."""
         if self.min_radius > self.max_radius:
-            raise ConfigError(
-                f"road: got min_radius {self.min_radius:g} m and max_radius {self.max_radius:g} m; "
-                "expected min_radius <= max_radius"
-            )
+            got = self._got("min_radius", "max_radius")
+            raise ConfigError(f"{got}; expected min_radius <= max_radius")
         x, y = np.meshgrid(grid.axis(0), grid.axis(1), indexing="ij")
         ground, bump = np.zeros(grid.shape), math.ceil(self.bump_length / grid.cell)
         cells = grid.cells(self.spacing)

@@ -58,8 +58,7 @@ class Rocks(Terrain):
         if self.min_radius > self.max_radius or not len(xy):
             raise ConfigError(
                 f"rocks: got radii {self.min_radius:g} m to {self.max_radius:g} m; expected min <= "
-                "max, and a rock that fits beside the platform in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"max, and a rock that fits beside the platform in a patch of {grid.extent}"
             )
         # Normalized Gaussian vectors are distributed evenly over the sphere.
         direction = rng.standard_normal((len(xy), _POINTS, 3))

@@ -80,9 +80,8 @@ class Rooms(FlatTerrain):
         counts, pitch = self._counts(grid), self.side + self.thickness
         if min(counts) < 1 or self.door >= self.side:
             raise ConfigError(
-                f"rooms: got door {self.door:g} m, side {self.side:g} m and thickness "
-                f"{self.thickness:g} m; expected door < side, and a room that fits in a patch of "
-                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('door', 'side', 'thickness')}; expected door < side, and a room that "
+                f"fits in a patch of {grid.extent}"
             )
         layout = []
         for axis in (0, 1):

@@ -65,8 +65,7 @@ class Sidewalk(Curbside):
         free = grid.length(last - self.curb_cell(grid))
         if free < 2 * self.strip:
             raise ConfigError(
-                f"sidewalk: got curb {self.curb:g} m, gutter {self.gutter:g} m, grade "
-                f"{self.grade:g} and tree_grate {self.tree_grate:g} m, which need "
+                f"{self._got('curb', 'gutter', 'grade', 'tree_grate')}, which need "
                 f"{2 * self.strip:g} m; expected at most {max(free, 0.0):g} m between start, end "
                 f"and gutters in a patch {grid.size[0]:g} m long"
             )

@@ -107,11 +107,9 @@ class SpiralStairs(FlatTerrain, Stairway):
             or self.number > MAX_PER_AXIS
         ):
             raise ConfigError(
-                f"spiral_stairs: got column {self.column:g} m, radius {self.radius:g} m, tread "
-                f"{self.tread:g} m and number {self.number}; expected column < radius, a tread of "
-                f"at most a quarter turn, at most {MAX_PER_AXIS} treads, and a spiral that fits "
-                f"behind a start of {start:g} m in a patch of {grid.size[0]:g} m x "
-                f"{grid.size[1]:g} m"
+                f"{self._got('column', 'radius', 'tread', 'number')}; expected column < radius, a "
+                f"tread of at most a quarter turn, at most {MAX_PER_AXIS} treads, and a spiral "
+                f"that fits behind a start of {start:g} m in a patch of {grid.extent}"
             )
         angles = np.float64(-math.pi / 2) + angle * np.arange(self.number + 1)
         return (x, grid.center[1]), angles

@@ -166,10 +166,9 @@ class Staircase(FlatTerrain, Stairway):
             ):
                 return number
         raise ConfigError(
-            f"staircase: got going {self.going:g} m, width {self.width:g} m, landing "
-            f"{self.landing:g} m, start {self.start:g} m and riser_difference "
-            f"{self.riser_difference:g} m; expected a {self.shape} staircase with riser_difference "
-            f"< riser that fits in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+            f"{self._got('going', 'width', 'landing', 'start', 'riser_difference')}; expected a "
+            f"{self.shape} staircase with riser_difference < riser that fits in a patch of "
+            f"{grid.extent}"
         )
 
     def _origin(self, grid: Grid, parts: StairParts) -> tuple[float, float]:

@@ -93,9 +93,8 @@ class StairsTurning(Stairway):
         number = min(self.number, free // grid.cells(self.tread))
         if number < 1:
             raise ConfigError(
-                f"stairs_turning: got tread {self.tread:g} m, landing {self.landing:g} m and start "
-                f"{self.start:g} m; expected flights that fit in a patch of {grid.size[0]:g} m x "
-                f"{grid.size[1]:g} m"
+                f"{self._got('tread', 'landing', 'start')}; expected flights that fit in a patch "
+                f"of {grid.extent}"
             )
         return number
 

@@ -45,7 +45,7 @@ class Star(Terrain):
         if rim >= min(grid.margin(platform)):
             raise ConfigError(
                 f"star: got a rim of {self.rim:g} m and a platform of {self.platform:g} m; "
-                f"expected a pit between them in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"expected a pit between them in a patch of {grid.extent}"
             )
         ground = np.zeros(grid.shape)
         ground[rim:-rim, rim:-rim] = -self.depth

@@ -78,9 +78,8 @@ class Stepfield(Lane):
         nx, ny = (grid.shape[0] - strips) // field, (grid.shape[1] - 2) // field
         if min(nx, ny) < 1:
             raise ConfigError(
-                f"stepfield: got post {self.post:g} m, start {self.start:g} m and end "
-                f"{self.end:g} m; expected a field of {_POSTS} x {_POSTS} posts that fits in a "
-                f"patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+                f"{self._got('post', 'start', 'end')}; expected a field of {_POSTS} x {_POSTS} "
+                f"posts that fits in a patch of {grid.extent}"
             )
         return nx, ny
 

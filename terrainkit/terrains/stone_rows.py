@@ -74,8 +74,7 @@ class StoneRows(Lane):
         number = max_number("stone_rows", pitch, length - self.gap)
         if number < 1 or 2 * self.stone + self.row_gap > width:
             raise ConfigError(
-                f"stone_rows: got stone {self.stone:g} m, gap {self.gap:g} m and row_gap "
-                f"{self.row_gap:g} m; expected two rows that fit in a pit of {length:g} m x "
-                f"{width:g} m"
+                f"{self._got('stone', 'gap', 'row_gap')}; expected two rows that fit in a pit of "
+                f"{length:g} m x {width:g} m"
             )
         return np.asarray(low[0] + self.gap + np.arange(number) * pitch)

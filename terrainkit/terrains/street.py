@@ -110,10 +110,9 @@ class Street(Curbside):
         widest = max(self.step_width, _BOX[1][1])
         if not (free >= self.passage and self.door < self.step_width and widest < self.spacing):
             raise ConfigError(
-                f"street: got passage {self.passage:g} m, door {self.door:g} m and step_width "
-                f"{self.step_width:g} m; expected door < step_width < spacing, a spacing above "
-                f"{_BOX[1][1]:g} m, and at most {max(free, 0.0):g} m between curb and steps in a "
-                f"patch {grid.size[0]:g} m long"
+                f"{self._got('passage', 'door', 'step_width')}; expected door < step_width < "
+                f"spacing, a spacing above {_BOX[1][1]:g} m, and at most {max(free, 0.0):g} m "
+                f"between curb and steps in a patch {grid.size[0]:g} m long"
             )
         return start
 

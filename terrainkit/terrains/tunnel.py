@@ -41,10 +41,8 @@ class Tunnel(FlatTerrain, SlotLane):
         """Return two walls and a roof for each tunnel."""
         wall = (grid.size[1] - self.width) / 2
         if not wall > 0:
-            raise ConfigError(
-                f"tunnel: got width {self.width:g} m; expected less than the width of the patch, "
-                f"{grid.size[1]:g} m"
-            )
+            expected = f"expected less than the width of the patch, {grid.size[1]:g} m"
+            raise ConfigError(f"{self._got('width')}; {expected}")
         edges = self.slot_edges(grid)
         x = (edges[:-1] + edges[1:]) / 2
         walls = [
