@@ -155,18 +155,7 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     columns = sample_columns(patch, rule)
     segments = _segments(patch, columns)
     graph = FootholdGraph.build(columns, limits, _outer_nodes(patch, columns, segments))
-    path = _Path(graph, segments)
-    return PatchFeasibility(
-        row=0,
-        col=0,
-        terrain=patch.terrain,
-        difficulty=patch.difficulty,
-        demand=path.demand if path.demand <= MAX_DEMAND else float("inf"),
-        limit=path.limit,
-        value=path.value,
-        place=path.place,
-        path=path.points,
-    )
+    return _assess_path(patch, graph, segments)
 
 
 def _segments(patch: Patch, columns: Columns) -> list[Segment]:
@@ -209,38 +198,46 @@ def _outer_nodes(patch: Patch, columns: Columns, segments: list[Segment]) -> NDA
     return is_outer
 
 
-class _Path:
-    """The path through all segments, and its blocking place."""
-
-    def __init__(self, graph: FootholdGraph, segments: list[Segment]) -> None:
-        self.demand, self.limit, self.value = 0.0, "", float("nan")
-        self.place = np.full(3, np.nan)
-        size, position = graph.columns.floor.size, graph.columns.positions
-        nodes = [segments[0][0]]
-        step_demand = graph.demand(graph.steps)
-        for start, targets in segments:
-            if nodes[-1] != start:
-                break
-            usable = path_edges(graph, step_demand, (start, targets))
-            ratios = graph.demand(usable)
-            ends = position(usable.end) - position(usable.start)
-            # Of the least demanding paths, a short one over easy ground: a step at the limit counts
-            # as twice its length.
-            length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
-            way = shortest_path(usable, length, start, targets, size)
-            if way is None:
-                self.demand = float("inf")
-                break
-            if not len(way):
-                continue
-            nodes += usable.end[way].tolist()
-            worst = way[np.argmax(ratios[way])]
-            if ratios[worst] > self.demand:
-                edge = usable.select(np.arange(len(ratios)) == worst)
-                self.limit, self.value = graph.blocking(edge)
-                self.demand = float(ratios[worst])
-                self.place = (position(edge.start)[0] + position(edge.end)[0]) / 2
-        self.points = position(np.array(nodes))
+def _assess_path(patch: Patch, graph: FootholdGraph, segments: list[Segment]) -> PatchFeasibility:
+    """Return what the path through all segments demands, and its blocking place."""
+    demand, limit, value = 0.0, "", float("nan")
+    place = np.full(3, np.nan)
+    size, position = graph.columns.floor.size, graph.columns.positions
+    nodes = [segments[0][0]]
+    step_demand = graph.demand(graph.steps)
+    for start, targets in segments:
+        if nodes[-1] != start:
+            break
+        usable = path_edges(graph, step_demand, (start, targets))
+        ratios = graph.demand(usable)
+        ends = position(usable.end) - position(usable.start)
+        # Of the least demanding paths, a short one over easy ground: a step at the limit counts
+        # as twice its length.
+        length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
+        way = shortest_path(usable, length, start, targets, size)
+        if way is None:
+            demand = float("inf")
+            break
+        if not len(way):
+            continue
+        nodes += usable.end[way].tolist()
+        worst = way[np.argmax(ratios[way])]
+        if ratios[worst] > demand:
+            edge = usable.select(np.arange(len(ratios)) == worst)
+            limit, value = graph.blocking(edge)
+            demand = float(ratios[worst])
+            place = (position(edge.start)[0] + position(edge.end)[0]) / 2
+    return PatchFeasibility(
+        row=0,
+        col=0,
+        terrain=patch.terrain,
+        difficulty=patch.difficulty,
+        demand=demand if demand <= MAX_DEMAND else float("inf"),
+        limit=limit,
+        value=value,
+        place=place,
+        path=position(np.array(nodes)),
+    )
 
 
 def _check_goals(patch: Patch, rule: WallRule) -> None:
