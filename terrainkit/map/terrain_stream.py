@@ -114,13 +114,10 @@ class TerrainStream:
         index: int = convert("terrain", terrain, Annotated[int, Meta(ge=0, lt=len(self._configs))])
         config = copy(self._configs[index])
         seed = np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]
-        values = {
-            "selected_difficulty": convert("difficulty", difficulty, Fraction),
-            "seed": int(seed) >> 1,
-        }
         # `replace` would validate all values again, which takes longer than to build most patches.
-        for name, value in values.items():
-            object.__setattr__(config, name, value)
+        selected = convert("difficulty", difficulty, Fraction)
+        object.__setattr__(config, "selected_difficulty", selected)
+        object.__setattr__(config, "seed", int(seed) >> 1)
         return config
 
     def prefetch(self, env_ids: ArrayLike, terrains: ArrayLike, difficulties: ArrayLike) -> None:

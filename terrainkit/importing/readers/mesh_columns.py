@@ -5,7 +5,7 @@ meets an edge or a vertex. Casting rays finds one crossing at a time, and may mi
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +48,7 @@ class Columns:
 
     def lowered(self, z: float) -> "Columns":
         """Return the columns of the mesh moved down by `z` [m]."""
-        top, floor, ceiling = self.top - z, self.floor - z, self.ceiling - z
-        return Columns(top=top, floor=floor, ceiling=ceiling, sheets=self.sheets)
+        return replace(self, top=self.top - z, floor=self.floor - z, ceiling=self.ceiling - z)
 
 
 def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) -> Columns:
