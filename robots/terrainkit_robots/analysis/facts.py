@@ -1,6 +1,7 @@
 """Facts that follow from a robot description, each computed on first use."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, wraps
@@ -19,8 +20,6 @@ from terrainkit_robots.analysis.bodies.world_base import with_free_base, with_wo
 from terrainkit_robots.analysis.inertia.inertia_repair import InertiaRepair
 from terrainkit_robots.analysis.legs.closed_loops import BodyLoop, body_loops
 from terrainkit_robots.analysis.legs.default_pose import default_positions
-from terrainkit_robots.analysis.legs.joint_roles import leg_joints, robot_joints
-from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
 from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
 from terrainkit_robots.analysis.legs.passive_joints import passive_joints
@@ -276,34 +275,37 @@ class Facts:
 
     @cached_property
     def leg_joints(self) -> list[Joint]:
-        """Joints that belong to exactly one leg."""
-        return leg_joints(self.legs, self.bodies)
+        """Joints that belong to exactly one leg, with those in its closed loops.
+
+        A joint that legs share, such as a waist, is left out.
+        """
+        joints = [joint for leg in self.legs for joint in (*leg.joints, *leg.branches)]
+        uses = Counter(joint.name for joint in joints)
+        unshared = {joint.name for joint in self.robot_joints if uses[joint.name] == 1}
+        return [joint for joint in joints if joint.name in unshared]
 
     @cached_property
     def robot_joints(self) -> list[Joint]:
         """The moving joints, except the joints that move the base of a planar model."""
-        return robot_joints(self.bodies)
-
-    @cached_property
-    def leg_model(self) -> LegModel:
-        """The facts that pose and stance are computed from."""
-        return LegModel(
-            bodies=self.bodies,
-            joints=self.joints,
-            actuated={joint.name for joint in self.actuated},
-            legs=self.legs,
-            loops=self.loops,
-            mirror=self.mirror,
-            keyframe=self.model.keyframe,
-            meshes=self.meshes,
-        )
+        # Of several bodies on the world, each is a part of the robot.
+        is_single = sum(body.parent == 0 for body in self.bodies) == 1
+        base = {0} if is_single and self.bodies[0].virtual else set()
+        found = []
+        for body in self.bodies[1:]:
+            if body.parent in base:
+                if body.virtual:
+                    base.add(body.index)
+                continue
+            if body.joint is not None and body.joint.moves:
+                found.append(body.joint)
+        return found
 
     @cached_property
     def stance(self) -> Stance | None:
         """The stance at `default_pose`. None without legs."""
         if not self.legs:
             return None
-        return compute_stance(self.leg_model, self.default_pose, total_mass=self.total_mass)
+        return compute_stance(self, self.default_pose, total_mass=self.total_mass)
 
     @cached_property
     def default_pose(self) -> Mapping[str, float]:
@@ -312,9 +314,7 @@ class Facts:
         A position comes from the spec, the first keyframe, the solved standing pose, or is the
         value within the limits that is closest to zero, in this order.
         """
-        spec_pose = None if self.spec is None else self.spec.default_pose
-        actuated = [joint.name for joint in self.actuated]
-        return default_positions(self.leg_model, spec_pose, actuated)
+        return default_positions(self)
 
     # Symmetry
 

@@ -253,7 +253,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
 
 def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
     """Return one line if the first keyframe is not the default pose."""
-    defect = keyframe_defect(facts.leg_model)
+    defect = keyframe_defect(facts)
     if not defect:
         return ()
     return (

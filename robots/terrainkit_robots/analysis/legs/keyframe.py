@@ -1,6 +1,7 @@
 """Decide whether the first keyframe of a file is a standing pose."""
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,9 +9,11 @@ from terrainkit_robots.analysis.bodies.bodies import center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import min_height
-from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 _MIN_CLEARANCE = 0.01
 """Clearance of the trunk, hips and thighs above the ground, at least, over the leg length."""
@@ -24,22 +27,22 @@ _MAX_COM_OFFSET = 0.03
 length."""
 
 
-def has_leg_positions(robot: LegModel) -> bool:
+def has_leg_positions(robot: "Facts") -> bool:
     """Return whether the keyframe has the positions of all joints of the legs."""
-    keyframe = robot.keyframe
+    keyframe = robot.model.keyframe
     return bool(keyframe) and all(j.name in keyframe for leg in robot.legs for j in leg.joints)
 
 
-def is_standing_keyframe(robot: LegModel) -> bool:
+def is_standing_keyframe(robot: "Facts") -> bool:
     """Return whether the robot stands on its feet in the keyframe."""
     return has_leg_positions(robot) and not keyframe_defect(robot)
 
 
-def keyframe_defect(robot: LegModel) -> str:
+def keyframe_defect(robot: "Facts") -> str:
     """Return why the feet do not carry the robot in the keyframe; empty if they do."""
     if not has_leg_positions(robot) or not robot.legs:
         return ""
-    positions = {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
+    positions = {joint.name: robot.model.keyframe.get(joint.name, 0.0) for joint in robot.joints}
     poses = body_poses(robot.bodies, positions)
     lowest = {
         body.index: min(min_height(shape, pose, robot.meshes) for shape in body.collisions)
@@ -67,7 +70,7 @@ def keyframe_defect(robot: LegModel) -> str:
     return ""
 
 
-def _com_offset(robot: LegModel, poses: Sequence[Matrix]) -> float:
+def _com_offset(robot: "Facts", poses: Sequence[Matrix]) -> float:
     """Return how far the center of mass is outside of the rectangle around the feet [m]."""
     feet = [leg.limb.chain[-1] for leg in robot.legs]
     points = np.concatenate([contact_points(robot.bodies[i], poses[i], robot.meshes) for i in feet])
@@ -76,7 +79,7 @@ def _com_offset(robot: LegModel, poses: Sequence[Matrix]) -> float:
     return float(outside.max(initial=0.0)) if np.isfinite(com).all() else 0.0
 
 
-def _lower_leg(leg: Leg, robot: LegModel) -> Iterator[int]:
+def _lower_leg(leg: Leg, robot: "Facts") -> Iterator[int]:
     """Yield the last body of a leg, and all bodies that its knee moves."""
     knee = leg.joint("knee")
     is_below = False

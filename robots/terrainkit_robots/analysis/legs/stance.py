@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass, subtr
 from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import min_height
-from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 GRAVITY = 9.81
 """Acceleration of gravity, as in MuJoCo [m/s2]."""
@@ -59,7 +62,7 @@ class Stance:
         return self.height + 0.01
 
 
-def compute_stance(robot: LegModel, positions: Mapping[str, float], *, total_mass: float) -> Stance:
+def compute_stance(robot: "Facts", positions: Mapping[str, float], *, total_mass: float) -> Stance:
     """Return the stance of a robot with legs.
 
     Args:

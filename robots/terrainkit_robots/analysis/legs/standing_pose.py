@@ -7,6 +7,7 @@ ankle keeps the sole level, and all other joints stay at zero. Of mirrored legs 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from terrainkit_robots.analysis.bodies.contact import contact_points, flat_foot_
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis, joint_motion
 from terrainkit_robots.analysis.legs.closed_loops import close_loops
 from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
-from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix, invert_poses
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 # This ratio and the next one were chosen in trials on 39 robots.
 _HEIGHT_RATIO = {2: 0.965}
@@ -85,14 +88,14 @@ _MIN_KNEE_HEIGHT = 0.15
 """Smallest height of the knee above the ground, over the leg length."""
 
 
-def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
+def solve_standing_pose(robot: "Facts") -> Mapping[str, float]:
     """Return the position of each moving joint in the standing pose [rad] or [m], by name.
 
     A keyframe in which the robot stands on its feet is used unchanged. Mimic joints are treated as
     if they were free. Closed loops are closed in the end, if that is possible.
     """
     if is_standing_keyframe(robot):
-        return {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
+        return {joint.name: robot.model.keyframe.get(joint.name, 0.0) for joint in robot.joints}
     positions = {joint.name: clip_to_limits(joint, joint.reference) for joint in robot.joints}
     positions |= {
         joint.name: _initial_position(joint)
@@ -113,7 +116,8 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     if not robot.loops:
         return positions
     legs = {joint.name for leg in robot.legs for joint in leg.joints}
-    return close_loops(robot.loops, robot.bodies, positions, legs=legs, actuated=robot.actuated)
+    actuated = {joint.name for joint in robot.actuated}
+    return close_loops(robot.loops, robot.bodies, positions, legs=legs, actuated=actuated)
 
 
 def round_position(joint: Joint, position: float) -> float:
@@ -145,7 +149,7 @@ def joint_range(joint: Joint) -> tuple[float, float]:
     return joint.range or (-np.inf, np.inf)
 
 
-def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
+def _leg_pairs(robot: "Facts") -> list[tuple[Leg, Leg | None, Sequence[int]]]:
     """Return each leg to solve, the leg that mirrors it, and the signs of its joints."""
     legs, done = robot.legs, set[int]()
     uses = Counter(i for leg in legs for i in leg.limb.chain)  # a waist mirrors itself
@@ -177,7 +181,7 @@ def _mirror_solution(
     }
 
 
-def _foot_shift(robot: LegModel, positions: Mapping[str, float]) -> Matrix:
+def _foot_shift(robot: "Facts", positions: Mapping[str, float]) -> Matrix:
     """Return the offset of the feet from their hips that puts the mass above them, shape (3,)."""
     poses = body_poses(robot.bodies, positions)
     center = center_of_mass(robot.bodies, poses)
@@ -188,7 +192,7 @@ def _foot_shift(robot: LegModel, positions: Mapping[str, float]) -> Matrix:
     return np.asarray(offset * min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-9)))
 
 
-def _hip_point(leg: Leg, robot: LegModel, poses: Sequence[Matrix]) -> Matrix:
+def _hip_point(leg: Leg, robot: "Facts", poses: Sequence[Matrix]) -> Matrix:
     """Return a point of the hip axis, or of the first joint of a leg without a hip, shape (3,)."""
     moving = [i for i in leg.limb.chain if (j := robot.bodies[i].joint) is not None and j.moves]
     own = [(i, role) for i, role in zip(moving, leg.roles, strict=True) if role != "waist"]
@@ -296,7 +300,7 @@ def _limit_cost(position: Matrix, joint: Joint) -> Matrix:
 
 
 def _solve_leg(
-    leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
+    leg: Leg, robot: "Facts", positions: Mapping[str, float], shift: Matrix
 ) -> dict[str, float]:
     """Return the best positions of hip, knee and ankle. Empty without a hip and a knee."""
     objective = _make_objective(leg, robot, positions, shift)
@@ -361,7 +365,7 @@ def _search_range(joint: Joint) -> tuple[float, float]:
 
 
 def _make_objective(
-    leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
+    leg: Leg, robot: "Facts", positions: Mapping[str, float], shift: Matrix
 ) -> _LegObjective | None:
     hip, knee = leg.joint("hip"), leg.joint("knee")
     if hip is None or knee is None:
@@ -400,7 +404,7 @@ def _make_objective(
     )
 
 
-def _ankle_offset(leg: Leg, robot: LegModel, foot: Matrix) -> Matrix:
+def _ankle_offset(leg: Leg, robot: "Facts", foot: Matrix) -> Matrix:
     """Return the offset from the middle of a sole toward a point below the ankle, shape (3,) [m].
 
     The ankle carries the weight times its horizontal distance to the center of mass, which is put
@@ -423,7 +427,7 @@ def _ankle_offset(leg: Leg, robot: LegModel, foot: Matrix) -> Matrix:
     return np.asarray(np.clip(above[:3] @ forward - sole.mean(), -reach, reach) * forward)
 
 
-def _penalty_axis(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
+def _penalty_axis(leg: Leg, robot: "Facts", poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
     """Return the horizontal unit vector in the plane of a leg that points away from the middle.
 
     Zero for robots that do not have four legs, for a leg in the middle, and for a leg that points
@@ -438,7 +442,7 @@ def _penalty_axis(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point:
 
 
 def _level_coefficients(
-    leg: Leg, robot: LegModel, positions: Mapping[str, float], angle: float
+    leg: Leg, robot: "Facts", positions: Mapping[str, float], angle: float
 ) -> tuple[float, float, float]:
     """Return the ankle position that keeps the sole level: constant and slopes over hip and knee.
 

@@ -134,7 +134,7 @@ def _pose_provenance(facts: Facts) -> Provenance:
     reason = f"first keyframe of {one_line(facts.model.file.name)}"
     declared = Provenance(origin="declared", reason=reason)
     if facts.legs:
-        if is_standing_keyframe(facts.leg_model):
+        if is_standing_keyframe(facts):
             return declared
         return Provenance(
             origin="solved", reason="legs bent, feet below the center of mass, other joints near 0"

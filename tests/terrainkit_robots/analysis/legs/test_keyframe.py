@@ -28,7 +28,7 @@ def table(knee=0.0, trunk_z=0.0, lift=0.0, com=0.0, joints=slice(None)):
     trunk = link("trunk", box("0.1 0.1 0.1", f"0 0 {trunk_z}"), mass=1e7, center=f"{com} 0 0")
     model = facts(trunk, *legs).model
     positions = {f"{name}{k}_joint": k * knee for name in ROOTS for k in range(2)}
-    return Facts(replace(model, keyframe=dict(list(positions.items())[joints]))).leg_model
+    return Facts(replace(model, keyframe=dict(list(positions.items())[joints])))
 
 
 @pytest.mark.parametrize(("changes", "defect"), read_table(__file__, "keyframe_defect_names_cause"))
@@ -58,6 +58,6 @@ def test_keyframe_without_all_joints_has_no_defect():
     ],
 )
 def test_lower_leg_is_what_the_knee_moves(bundled, name, expected):
-    robot = bundled(name).leg_model
+    robot = bundled(name)
     leg = robot.legs[0]
     assert [robot.bodies[index].name for index in _lower_leg(leg, robot)] == expected

@@ -127,7 +127,7 @@ def by_joint(hip, knee):
 
 def stand(robot, hip, knee, **other):
     positions = by_joint(hip, knee) | other
-    return compute_stance(robot.leg_model, positions, total_mass=robot.total_mass)
+    return compute_stance(robot, positions, total_mass=robot.total_mass)
 
 
 def test_stance_on_straight_legs():
@@ -182,7 +182,7 @@ def test_stance_without_mass_has_no_torques():
     stance = stand(robot, 0.5, -1.0)
     assert stance.torques == pytest.approx(by_joint(0, 0), abs=1e-9)
     assert np.isfinite(stance.margin)
-    unknown = compute_stance(robot.leg_model, stance.positions, total_mass=math.nan)
+    unknown = compute_stance(robot, stance.positions, total_mass=math.nan)
     assert (unknown.torques, math.isnan(unknown.margin)) == ({}, True)
 
 

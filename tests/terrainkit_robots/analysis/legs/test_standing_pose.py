@@ -185,7 +185,7 @@ def test_standing_pose_puts_feet_below_hips():
 def test_knees_of_quadrupeds_avoid_the_outside(roots, expected):
     # A leg in the middle, within a tenth of its length of 0.47 m, has no outside.
     legs = [leg(f"leg_{name}", root, 0.25, 0.2) for name, root in roots.items()]
-    robot = small_robots.facts(link("trunk", mass=20), *legs).leg_model
+    robot = small_robots.facts(link("trunk", mass=20), *legs)
     places = [np.array(root.split(), float) for root in roots.values()]
     found = [
         _penalty_axis(each, robot, body_poses(robot.bodies, {}), place)
@@ -239,7 +239,7 @@ def test_standing_pose_with_invalid_limits(limits):
 def test_standing_pose_keeps_keyframe():
     robot = Facts(load_robot(bundled.urdf_path("quadruped").with_suffix(".xml")))
     expected = {each.name: robot.model.keyframe[each.name] for each in robot.joints}
-    assert solve_standing_pose(robot.leg_model) == robot.default_pose == expected
+    assert solve_standing_pose(robot) == robot.default_pose == expected
     assert robot.stance.positions == robot.default_pose
 
 
@@ -247,4 +247,4 @@ def test_standing_pose_without_legs():
     slide = small_robots.joint("a", "b", limits=(0.5, 1))
     robot = small_robots.facts(link("a"), link("b"), slide)
     assert robot.stance is None
-    assert solve_standing_pose(robot.leg_model) == {"b_joint": 0.5}
+    assert solve_standing_pose(robot) == {"b_joint": 0.5}
