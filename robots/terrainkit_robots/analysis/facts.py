@@ -35,16 +35,10 @@ from terrainkit_robots.analysis.symmetry.asymmetry import Misalignment, find_mis
 from terrainkit_robots.analysis.symmetry.copies import copied_pairs
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
-from terrainkit_robots.analysis.symmetry.mirror_pairs import (
-    MirrorPair,
-    Outlier,
-    mirror_pairs,
-    outlier_first,
-)
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, mirror_pairs
 from terrainkit_robots.description.model import Joint, Link, RobotModel
 from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
@@ -349,21 +343,6 @@ class Facts:
         """The misaligned pairs of `uncopied_pairs`, and the indices of the displaced bodies."""
         tips = {leg.limb.chain[-1]: leg.limb.tip for leg in self.legs}
         return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies, tips)
-
-    def outlier_first(
-        self,
-        pair: MirrorPair,
-        value: Callable[[Body], Matrix | None],
-        misfit: Callable[[Body], float | None] = lambda _: None,
-    ) -> Outlier:
-        """Return the joints of a pair; first the joint that deviates more from the other legs.
-
-        Args:
-            pair: The mirrored joints.
-            value: Function of a body that returns the quantity to compare, or None if it has none.
-            misfit: Function of a body that returns how much it contradicts its shapes, or None.
-        """
-        return outlier_first(pair, value, self.bodies, self.legs, self.mirror, misfit)
 
     # Simulators
 

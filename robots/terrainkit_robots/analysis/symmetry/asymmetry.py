@@ -211,8 +211,7 @@ def _is_rotated(mirror: Mirror, pair: MirrorPair, angle: float) -> bool:
         left, right = (side.body.zero_pose[:3, :3] for side in (pair.left, pair.right))
         mirrored = mirror.image(mirror.image(left).T).T
         return bool(np.abs(mirrored - right).max() > math.sin(MAX_AXIS_ERROR))
-    distance = float(np.linalg.norm(mirror.image(pair.left.arm) - pair.right.arm))
-    return distance > 0.5 * 2 * math.sin(angle / 2) * arm
+    return pair.com_error(mirror) > 0.5 * 2 * math.sin(angle / 2) * arm
 
 
 def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> bool:
@@ -220,11 +219,6 @@ def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> b
     mirrored = b if sign > 0 else (-b[1], -b[0])
     tolerance = MAX_LIMIT_ERROR + MAX_RELATIVE_LIMIT_ERROR * min(a[1] - a[0], b[1] - b[0])
     return all(abs(x - y) <= tolerance for x, y in zip(a, mirrored, strict=True))
-
-
-def has_flipped_axes(left: MirrorSide, right: MirrorSide) -> bool:
-    """Return whether two axes point in opposite directions, instead of in the same one."""
-    return bool(left.axis @ right.axis < 0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -293,7 +287,7 @@ def find_flipped_pairs(
             for pair in in_legs
             if (abs(float(pair.left.axis @ mirror.normal)) > _MIN_PARALLEL_COSINE) == bends
         ]
-        opposed = [pair for pair in comparable if has_flipped_axes(pair.left, pair.right)]
+        opposed = [pair for pair in comparable if pair.has_flipped_axes]
         others = len(comparable) - len(opposed)
         if len(opposed) != 1 or others < _MIN_OTHER_PAIRS:
             continue

@@ -1,8 +1,9 @@
 """Compute the pairs of mirrored joints, and which joint of a pair is the outlier."""
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
@@ -13,6 +14,20 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, Sign, swap_sides
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
+
+MAX_MASS_DIFFERENCE = 0.02
+"""Allowed relative difference of masses: cables and screws that CAD adds on one side only."""
+
+_MIN_MASS_SHARE = 0.001
+"""Share of the robot's mass. At the end of a leg, the whole mass of such a body shifts the robot's
+center of mass by a thousandth of the leg's distance."""
+
+MAX_COM_ERROR, _COM_ERROR_SHARE = 0.002, 0.1
+"""Allowed distance of a center of mass from the mirrored one: a constant [m] plus a share of the
+radius of gyration."""
 
 _MIN_CLEAR_RATIO = 3.0
 """Ratio from which a difference of one side is clearly larger than that of the other side."""
@@ -65,6 +80,50 @@ class MirrorPair:
         """Return the indices of the two bodies."""
         return {self.left.body.index, self.right.body.index}
 
+    @property
+    def bodies(self) -> tuple[Body, Body]:
+        """Return the two bodies."""
+        return self.left.body, self.right.body
+
+    @property
+    def has_flipped_axes(self) -> bool:
+        """Whether the axes point in opposite directions, instead of in the same one."""
+        return bool(self.left.axis @ self.right.axis < 0)
+
+    @property
+    def has_valid_masses(self) -> bool:
+        """Whether both bodies have valid masses; the INR rules report the others."""
+        inertials = [link.inertial for body in self.bodies for link in body.links]
+        masses = [inertial.mass for inertial in inertials if inertial is not None]
+        valid = all(mass is not None and mass >= 0 for mass in masses)
+        return valid and min(body.mass for body in self.bodies) > 0
+
+    @property
+    def is_merged(self) -> bool:
+        """Whether one of the bodies has several links with mass."""
+        return any(
+            sum(link.inertial is not None and bool(link.inertial.mass) for link in body.links) > 1
+            for body in self.bodies
+        )
+
+    def is_negligible(self, total: float) -> bool:
+        """Return whether both bodies are too light for a difference to matter, such as gears.
+
+        Args:
+            total: Mass of the robot [kg].
+        """
+        return max(body.mass for body in self.bodies) < _MIN_MASS_SHARE * total
+
+    def com_error(self, mirror: Mirror) -> float:
+        """Return the distance of a center of mass from the mirrored one [m]."""
+        return float(norm(mirror.image(self.left.arm) - self.right.arm))
+
+    @property
+    def max_com_error(self) -> float:
+        """Return the allowed distance of two centers of mass from mirrored, of valid masses [m]."""
+        radii = [math.sqrt(max(float(body.principal[2]), 0.0) / body.mass) for body in self.bodies]
+        return MAX_COM_ERROR + _COM_ERROR_SHARE * min(radii)
+
 
 def mirror_pairs(
     bodies: Sequence[Body], mirror: Mirror, leg_bodies: Collection[int]
@@ -113,12 +172,10 @@ def _mirror_joint(bodies: Sequence[Body], mirror: Mirror, index: int) -> MirrorS
 
 
 def outlier_first(
+    robot: "Facts",
     pair: MirrorPair,
     value: Callable[[Body], Matrix | None],
-    bodies: Sequence[Body],
-    legs: Sequence[Leg],
-    mirror: Mirror,
-    misfit: Callable[[Body], float | None],
+    misfit: Callable[[Body], float | None] = lambda _: None,
 ) -> Outlier:
     """Return two mirrored joints, first the joint that deviates more from the legs on its side.
 
@@ -126,25 +183,23 @@ def outlier_first(
     does not either, the right joint is first.
 
     Args:
+        robot: The robot.
         pair: The joints.
-        value: The property in which the two differ. Signs count less than magnitudes, because they
-            differ between front and rear for good reason.
-        bodies: The bodies, the trunk first.
-        legs: The legs of the robot.
-        mirror: The mirror plane.
+        value: The property in which the two differ; None if a body has none. Signs count less than
+            magnitudes, because they differ between front and rear for good reason.
         misfit: How much the property of a body contradicts its shapes; None if it is unknown.
     """
     left, right = pair.left, pair.right
-    siblings = _sibling_bodies(legs, pair.indices)
-    left_bodies = {pair.left for pair in mirror.pairs}
-    right_bodies = {pair.right for pair in mirror.pairs}
+    siblings = _sibling_bodies(robot.legs, pair.indices)
+    left_bodies = {pair.left for pair in robot.mirror.pairs}
+    right_bodies = {pair.right for pair in robot.mirror.pairs}
 
     def distance(joint: MirrorSide) -> float:
         own = value(joint.body)
         side = left_bodies if joint is left else right_bodies
         if own is None:
             return np.inf
-        others = [value(bodies[i]) for i in siblings if i in side]
+        others = [value(robot.bodies[i]) for i in siblings if i in side]
         return min(
             (
                 float(norm(np.abs(own) - np.abs(other)) + 0.01 * norm(own - other))

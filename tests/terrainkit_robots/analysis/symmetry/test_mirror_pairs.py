@@ -1,12 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
-    com_error,
-    has_valid_masses,
-    is_merged,
-    max_com_error,
-)
+from terrainkit_robots.analysis.symmetry.mirror_pairs import outlier_first
 from tests.small_robots import facts, joint, link
 
 ROUND = ".01 .01 .04 0 0 0"
@@ -41,19 +36,19 @@ def test_pairs_outside_of_legs_have_mirrored_names(left, right, count):
 def test_center_of_mass_is_compared_with_its_mirror_image():
     # The radius of gyration is 0.2 m of the left arm, and 0.1 m of the heavier right one.
     robot, pair = arms(center="0.003 -0.104 0", mass=4)
-    assert com_error(robot.mirror, pair) == pytest.approx(0.005)
-    assert max_com_error(pair) == pytest.approx(0.002 + 0.1 * 0.1)
+    assert pair.com_error(robot.mirror) == pytest.approx(0.005)
+    assert pair.max_com_error == pytest.approx(0.002 + 0.1 * 0.1)
 
 
 @pytest.mark.parametrize(("mass", "is_valid"), [(1, True), (0, False), (-1, False), ("x", False)])
 def test_masses_of_a_pair_are_positive(mass, is_valid):
-    assert has_valid_masses(arms(mass=mass)[1]) == is_valid
+    assert arms(mass=mass)[1].has_valid_masses == is_valid
 
 
 @pytest.mark.parametrize(("mass", "merged"), [(1, True), (0, False), (None, False)])
 def test_body_of_two_links_with_mass_is_merged(mass, merged):
     part = link("part", mass=mass) + joint("left", "part", kind="fixed")
-    assert is_merged(arms(more=part)[1]) == merged
+    assert arms(more=part)[1].is_merged == merged
 
 
 # Of the left, right, rear left and rear right thigh. The other legs decide from a factor of 3 on.
@@ -82,7 +77,7 @@ def test_outlier_differs_from_the_other_leg_of_its_side(bundled, values, first, 
     def value(body):
         return None if table[body.name] is None else np.array([table[body.name]])
 
-    odd, other, reason = robot.outlier_first(pair, value)
+    odd, other, reason = outlier_first(robot, pair, value)
     others = "FR_thigh" if first == "FL" else "FL_thigh"
     assert (odd.body.name, other.body.name) == (f"{first}_thigh", others)
     assert ("either side" in reason, odd.body.name in reason) == (not decided, decided)
@@ -102,5 +97,5 @@ def test_shapes_decide_without_other_legs(bundled, misfits, first, reason):
     names = "left_knee_link", "right_knee_link"
     pair = next(p for p in robot.mirror_pairs if p.left.body.name == names[0])
     table = dict(zip(names, misfits, strict=True))
-    found = robot.outlier_first(pair, lambda body: body.inertia, lambda body: table[body.name])
+    found = outlier_first(robot, pair, lambda body: body.inertia, lambda body: table[body.name])
     assert (found.odd.body.name, found.reason) == (f"{first}_knee_link", reason)

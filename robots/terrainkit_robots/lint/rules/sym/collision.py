@@ -9,7 +9,11 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.gaps import box_at_zero
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import (
+    MirrorPair,
+    MirrorSide,
+    outlier_first,
+)
 from terrainkit_robots.description.model import Geometry, Link
 from terrainkit_robots.lint.rule import Part, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import names, numbers
@@ -67,7 +71,7 @@ def collision_asymmetry(robot: Facts) -> Violations:
         def extent(body: Body) -> Matrix | None:
             return None if body.joint is None else bounds(body.collisions, robot.meshes)
 
-        odd, other, reason = robot.outlier_first(pair, extent, partial(_visual_offset, robot))
+        odd, other, reason = outlier_first(robot, pair, extent, partial(_visual_offset, robot))
         yield Violation(
             element=Part(odd.body.name, odd.body.collisions[0].geometry.source),
             message=f"bounding box of the collision shapes of {odd.body.name}: got a face "
@@ -123,7 +127,7 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
             siblings = _primitives(body)
             return np.array(siblings[index].size) if len(siblings) == len(shapes[0]) else None
 
-        odd, other, reason = robot.outlier_first(pair, size)
+        odd, other, reason = outlier_first(robot, pair, size)
         own, mirrored = (left, right) if odd is pair.left else (right, left)
         return Violation(
             element=Part(odd.body.name, own.size_source or own.source),

@@ -2,11 +2,6 @@
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import limits_match
-from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
-    com_error,
-    has_valid_masses,
-    max_com_error,
-)
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 
 
@@ -30,7 +25,7 @@ def copied_assembly(robot: Facts) -> Violations:
     differing = [
         pair
         for pair in copied
-        if (has_valid_masses(pair) and com_error(robot.mirror, pair) > max_com_error(pair))
+        if (pair.has_valid_masses and pair.com_error(robot.mirror) > pair.max_com_error)
         or (
             pair.sign != 0
             and (a := pair.left.joint.range) is not None

@@ -4,7 +4,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide, outlier_first
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.transforms import Matrix
 
@@ -47,7 +47,7 @@ def loss_asymmetry(robot: Facts) -> Violations:
             def value(body: Body, name: str = name) -> Matrix | None:
                 return None if body.joint is None else np.array([getattr(body.joint, name)])
 
-            odd, other, reason = robot.outlier_first(pair, value)
+            odd, other, reason = outlier_first(robot, pair, value)
             own, mirrored = getattr(odd.joint, name), getattr(other.joint, name)
             yield Violation(
                 element=Part(odd.joint.name, (odd.joint.dynamics or odd.joint).source),
@@ -90,7 +90,7 @@ def gear_asymmetry(robot: Facts) -> Violations:
             actuator = gears.get(body.joint.name) if body.joint else None
             return None if actuator is None else np.array([float(actuator.gear < 0)])
 
-        odd, other, _ = robot.outlier_first(pair, is_negative)
+        odd, other, _ = outlier_first(robot, pair, is_negative)
         if gears[odd.joint.name].gear > 0:
             odd, other = other, odd
         yield Violation(

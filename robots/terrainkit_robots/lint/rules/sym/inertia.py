@@ -7,15 +7,11 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import inertia_part
-from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
+from terrainkit_robots.analysis.symmetry.mirror_pairs import (
     MAX_MASS_DIFFERENCE,
-    com_error,
-    has_valid_masses,
-    is_merged,
-    is_negligible,
-    max_com_error,
+    MirrorPair,
+    outlier_first,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint_types
@@ -55,18 +51,18 @@ def inertia_asymmetry(robot: Facts) -> Violations:
     other_rules = OtherRules(robot, *_INERTIA_RULES)
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
-        if not has_valid_masses(pair) or not _has_same_parts(robot, pair):
+        if not pair.has_valid_masses or not _has_same_parts(robot, pair):
             continue
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
         difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
-        harmless = difference <= _MAX_MOMENT_DIFFERENCE or is_negligible(pair, robot.total_mass)
+        harmless = difference <= _MAX_MOMENT_DIFFERENCE or pair.is_negligible(robot.total_mass)
         if harmless or other_rules.report(pair):
             continue
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
             continue  # rounding explains the difference
-        odd, other, reason = robot.outlier_first(pair, lambda body: body.principal)
+        odd, other, reason = outlier_first(robot, pair, lambda body: body.principal)
         moments = [numbers(side.body.principal, ".4g", ", ") for side in (odd, other)]
         yield Violation(
             element=inertia_part(odd.body.main_link),
@@ -80,10 +76,10 @@ def inertia_asymmetry(robot: Facts) -> Violations:
 
 def _has_same_parts(robot: Facts, pair: MirrorPair) -> bool:
     """Return whether merged bodies agree in mass and center of mass; else moments must differ."""
-    if not is_merged(pair):
+    if not pair.is_merged:
         return True
     difference = relative_difference(pair.left.body.mass, pair.right.body.mass)
-    close = com_error(robot.mirror, pair) <= max_com_error(pair)
+    close = pair.com_error(robot.mirror) <= pair.max_com_error
     return close and difference <= MAX_MASS_DIFFERENCE
 
 
@@ -140,7 +136,7 @@ def product_asymmetry(robot: Facts) -> Violations:
         error = float(np.abs(reflection @ a @ reflection - b).max()) / largest
         if error <= _MAX_PRODUCT_ERROR or moments > _MAX_MOMENT_ERROR:
             continue
-        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia)
+        odd, other, reason = outlier_first(robot, pair, lambda body: body.inertia)
         yield Violation(
             element=inertia_part(odd.body.main_link),
             message=f"inertia of body {odd.body.name} in the axes of the trunk: got {error:.0%} "

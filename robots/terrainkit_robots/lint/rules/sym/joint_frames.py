@@ -14,10 +14,9 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     Misalignment,
     find_flipped_joints,
     find_flipped_pairs,
-    has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide, outlier_first
 from terrainkit_robots.lint.rule import Measured, Part, Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import check_joint_types
 from terrainkit_robots.text import numbers
@@ -88,7 +87,7 @@ def _opposite_axes(robot: Facts, reported: set[str]) -> Violations:
             continue
         negated = not limits_match(a, b, pair.sign) and limits_match(a, b, -pair.sign)
         known = not reported.isdisjoint({left.joint.name, right.joint.name})
-        if negated and has_flipped_axes(left, right) and not known:
+        if negated and pair.has_flipped_axes and not known:
             reported.add(right.joint.name)
             yield _report_axis(
                 left,
@@ -146,7 +145,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         parent = robot.physical_parent(body) if error.distance else None
         return None if parent is None else gap_between((parent, body), robot.meshes)
 
-    odd, other, reason = robot.outlier_first(error.pair, value, gap)
+    odd, other, reason = outlier_first(robot, error.pair, value, gap)
     name, mirror = odd.joint.name, other.joint.name
     if error.distance:
         offsets = [numbers(1000 * side.offset, ".1f", ", ") for side in (odd, other)]

@@ -7,9 +7,9 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_LIMIT_ERROR,
     MAX_RELATIVE_LIMIT_ERROR,
-    has_flipped_axes,
     limits_match,
 )
+from terrainkit_robots.analysis.symmetry.mirror_pairs import outlier_first
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.lint.rules.sym.mimic import same_way_follower
@@ -44,9 +44,9 @@ def limit_asymmetry(robot: Facts) -> Violations:
             continue
         if other_rules.report(pair) or same_way_follower(robot, pair) is not None:
             continue
-        if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
+        if pair.has_flipped_axes and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
-        odd, other, reason = robot.outlier_first(pair, _limit_sizes)
+        odd, other, reason = outlier_first(robot, pair, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
@@ -102,7 +102,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             limit = getattr(body.joint, name, None)
             return None if limit is None else np.array([limit])
 
-        odd, other, reason = robot.outlier_first(pair, value)
+        odd, other, reason = outlier_first(robot, pair, value)
         joint = odd.joint
         parts = list[str]()
         measured: dict[str, float | int | str] = {}

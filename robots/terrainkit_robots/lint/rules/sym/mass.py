@@ -10,16 +10,12 @@ from terrainkit_robots.analysis.bodies.gaps import box_at_zero, shapes_of
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import mass_part
-from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
+from terrainkit_robots.analysis.symmetry.mirror_pairs import (
     MAX_COM_ERROR,
     MAX_MASS_DIFFERENCE,
-    com_error,
-    has_valid_masses,
-    is_merged,
-    is_negligible,
-    max_com_error,
+    MirrorPair,
+    outlier_first,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint_types
@@ -50,11 +46,11 @@ def mass_asymmetry(robot: Facts) -> Violations:
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         difference = relative_difference(left.body.mass, right.body.mass)
-        if not has_valid_masses(pair) or difference <= MAX_MASS_DIFFERENCE:
+        if not pair.has_valid_masses or difference <= MAX_MASS_DIFFERENCE:
             continue
-        if is_negligible(pair, robot.total_mass) or other_rules.report(pair):
+        if pair.is_negligible(robot.total_mass) or other_rules.report(pair):
             continue
-        odd, other, reason = robot.outlier_first(pair, lambda body: np.array([body.mass]))
+        odd, other, reason = outlier_first(robot, pair, lambda body: np.array([body.mass]))
         yield Violation(
             element=mass_part(odd.body.main_link),
             message=f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
@@ -92,18 +88,18 @@ def com_asymmetry(robot: Facts) -> Violations:
     other_rules = OtherRules(robot, "INR008")
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
-        if pair.indices & displaced or not has_valid_masses(pair):
+        if pair.indices & displaced or not pair.has_valid_masses:
             continue
         difference = relative_difference(left.body.mass, right.body.mass)
-        if is_merged(pair) and difference > MAX_MASS_DIFFERENCE:
+        if pair.is_merged and difference > MAX_MASS_DIFFERENCE:
             continue  # a heavier part shifts the center of mass of the merged body
-        error, limit = com_error(robot.mirror, pair), max_com_error(pair)
+        error, limit = pair.com_error(robot.mirror), pair.max_com_error
         if error <= limit or other_rules.report(pair):
             continue
         if _is_same_part(robot, left.body, right.body) or _moves_with_shape(robot, pair, limit):
             continue
-        odd, other, reason = robot.outlier_first(
-            pair, lambda body: body.center, partial(_shape_offset, robot)
+        odd, other, reason = outlier_first(
+            robot, pair, lambda body: body.center, partial(_shape_offset, robot)
         )
         centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
         got, expected = contrast(1000 * error, 1000 * limit, ".3g")
