@@ -25,7 +25,7 @@ from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
 from terrainkit_robots.analysis.legs.passive_joints import passive_joints
 from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
 from terrainkit_robots.analysis.legs.wheels import is_balanced
-from terrainkit_robots.analysis.meshes.uses import UsedMesh, meshes_by_file, meshes_by_name
+from terrainkit_robots.analysis.meshes.uses import UsedMesh, is_missing, used_meshes
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import fixed_joints
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
@@ -229,12 +229,13 @@ class Facts:
     @cached_property
     def mesh_names(self) -> list[UsedMesh]:
         """The meshes, one for each name in the file."""
-        return meshes_by_name(self.model, self.meshes)
+        return used_meshes(self.model, self.meshes, lambda mesh: mesh.filename)
 
     @cached_property
     def mesh_files(self) -> list[UsedMesh]:
         """The meshes, one for each file, without the files that MSH001 reports."""
-        return meshes_by_file(self.model, self.meshes)
+        by_path = used_meshes(self.model, self.meshes, lambda mesh: mesh.path)
+        return [used for used in by_path if not is_missing(used)]
 
     # Legs
 

@@ -2,14 +2,7 @@ import pytest
 import trimesh
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes import replacement
-from terrainkit_robots.analysis.meshes.replacement import (
-    count_faces,
-    has_hull,
-    hull_stl,
-    simplified_stl,
-    stl_or_hull,
-)
+from terrainkit_robots.analysis.meshes import uses
 from terrainkit_robots.description.load import load_robot
 from tests.small_robots import link, shape
 
@@ -36,10 +29,10 @@ def faces(stl):
 def test_dense_mesh_is_replaced_by_its_hull(used, monkeypatch):
     mesh = used(trimesh.creation.annulus(0.9, 1, 1))
     for limit, expected in ((256, 256), (255, 124)):
-        monkeypatch.setattr(replacement, "MAX_COLLISION_FACES", limit)
-        assert faces(stl_or_hull(mesh)) == expected
-    assert count_faces(mesh) == 256
-    assert faces(hull_stl(used())) < 1000  # 500 vertices
+        monkeypatch.setattr(uses, "MAX_COLLISION_FACES", limit)
+        assert faces(mesh.stl_or_hull()) == expected
+    assert mesh.count_faces() == 256
+    assert faces(used().hull_stl()) < 1000  # 500 vertices
 
 
 @pytest.mark.parametrize(
@@ -48,24 +41,24 @@ def test_dense_mesh_is_replaced_by_its_hull(used, monkeypatch):
 )
 def test_faces_of_visual_meshes_are_counted_by_the_header(used, name, kind, expected):
     mesh = used(name=name, kind=kind)
-    assert count_faces(mesh) == expected
+    assert mesh.count_faces() == expected
     mesh.mesh.path.write_bytes(b"")
     mesh.meshes._cache.clear()
-    assert count_faces(mesh) is None
+    assert mesh.count_faces() is None
 
 
 def test_flat_mesh_has_no_hull(used):
     for scale, expected in (("1 1 1", True), ("1 0 1", False)):
         mesh = used(scale=scale)
-        assert has_hull(mesh.meshes, mesh.uses) == expected
+        assert uses.has_hull(mesh.meshes, mesh.uses) == expected
 
 
 def test_simplified_mesh_has_few_faces(used, monkeypatch):
     mesh = used()
-    assert simplified_stl(mesh)[84:] != b""
-    assert faces(simplified_stl(mesh)) == 1280
-    monkeypatch.setattr(replacement, "MAX_SIMPLIFIED_FACES", 300)
-    assert 100 < faces(simplified_stl(mesh)) <= 300
-    monkeypatch.setattr(replacement, "MAX_SIMPLIFIED_FACES", 1)
-    with pytest.raises(replacement.MeshError, match="has no faces left"):
-        simplified_stl(mesh)
+    assert mesh.simplified_stl()[84:] != b""
+    assert faces(mesh.simplified_stl()) == 1280
+    monkeypatch.setattr(uses, "MAX_SIMPLIFIED_FACES", 300)
+    assert 100 < faces(mesh.simplified_stl()) <= 300
+    monkeypatch.setattr(uses, "MAX_SIMPLIFIED_FACES", 1)
+    with pytest.raises(uses.MeshError, match="has no faces left"):
+        mesh.simplified_stl()

@@ -9,8 +9,6 @@ from terrainkit_robots.analysis.meshes.uses import (
     _unused_path,
     is_missing,
     mesh_uses,
-    meshes_by_file,
-    meshes_by_name,
     relative_name,
     rename_edits,
     replace_edits,
@@ -18,7 +16,6 @@ from terrainkit_robots.analysis.meshes.uses import (
 from terrainkit_robots.description.fix import WriteFile
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import EditedBytes
-from terrainkit_robots.mesh.mesh_cache import Meshes
 from tests.tables import read_table
 
 TWO_LINKS = read_table(__file__, "two_links")
@@ -47,8 +44,8 @@ def test_mesh_uses_of_every_link(robot):
     ]
 
 
-def test_meshes_by_name_groups_equal_names(robot):
-    used = meshes_by_name(robot().model, Meshes())
+def test_mesh_names_group_equal_names(robot):
+    used = robot().mesh_names
     assert [(u.label, len(u.uses), u.source.line, u.strict, is_missing(u)) for u in used] == [
         ("./m/foot.stl (collision mesh of a)", 1, 4, True, False),
         ("m/foot.stl (collision mesh of b)", 2, 3, True, False),
@@ -56,8 +53,8 @@ def test_meshes_by_name_groups_equal_names(robot):
     ]
 
 
-def test_meshes_by_file_skips_missing_files(robot):
-    (used,) = meshes_by_file(robot().model, Meshes())
+def test_mesh_files_skip_missing_files(robot):
+    (used,) = robot().mesh_files
     assert (used.name, used.source.line, len(used.uses)) == ("m/foot.stl", 3, 3)
     assert used.role == "collision mesh of a, b"
     assert [use.link.name for use in used.collisions] == ["a", "b"]
@@ -65,7 +62,7 @@ def test_meshes_by_file_skips_missing_files(robot):
 
 def replaced(robot, suffix="_hull.stl"):
     """Return the edits that replace the only mesh file."""
-    (used,) = meshes_by_file(robot.model, robot.meshes)
+    (used,) = robot.mesh_files
     return replace_edits(robot.model, robot.meshes, used.uses, suffix, lambda: b"hull")
 
 
@@ -127,7 +124,7 @@ def test_replaced_mesh_keeps_the_name_that_its_file_implied(robot, mesh):
 def test_replace_edits_of_xacro_and_malformed_files_are_none(robot):
     given = robot()
     expanded = Facts(replace(given.model, kind="xacro"))
-    (used,) = meshes_by_file(expanded.model, expanded.meshes)
+    (used,) = expanded.mesh_files
     assert rename_edits(expanded.model, used.uses, "x") is None
     assert replaced(expanded) is None
     given.model.file.write_text(TWO_LINKS.replace("</robot>", ""))

@@ -1,7 +1,7 @@
 """Rules on the convex hulls of collision meshes."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.replacement import MAX_STL_FACES, count_faces
+from terrainkit_robots.analysis.meshes.uses import MAX_STL_FACES
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import FLAT, thickness
@@ -54,7 +54,7 @@ def nonconvex_collision(robot: Facts) -> Violations:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
     for used in robot.mesh_files:
-        faces = count_faces(used) if used.collisions else None
+        faces = used.count_faces() if used.collisions else None
         if faces is None or faces > MAX_STL_FACES:
             continue
         first = used.collisions[0]

@@ -1,18 +1,15 @@
 """Rules on the number of faces of meshes."""
 
 from collections.abc import Sequence
-from functools import partial
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.replacement import (
+from terrainkit_robots.analysis.meshes.uses import (
     MAX_COLLISION_FACES,
     MAX_STL_FACES,
-    count_faces,
+    UsedMesh,
     has_hull,
-    hull_stl,
-    simplified_stl,
+    replace_edits,
 )
-from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
 from terrainkit_robots.description.fix import Edit, make_fix
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
@@ -33,7 +30,7 @@ def too_many_faces(robot: Facts) -> Violations:
         Observed in MuJoCo 4.0: "number of faces should be between 1 and 200000".
     """
     for used in robot.mesh_files:
-        faces = count_faces(used)
+        faces = used.count_faces()
         if faces is None or faces <= MAX_STL_FACES:
             continue
         is_rejected = used.strict and used.header.format in ("stl", "ascii-stl")
@@ -52,12 +49,12 @@ def _simplify_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     if used.header.format == "ascii-stl":
         return None  # MSH007 converts it first
     visuals = [use for use in used.uses if not use.is_collision]
-    simplify = partial(simplified_stl, used)
+    simplify = used.simplified_stl
     if robot.model.kind == "mjcf":  # all uses share one element
         return replace_edits(robot.model, robot.meshes, used.uses, "_simplified.stl", simplify)
     edits: list[Edit] = []
     for uses, ending, content in (
-        (used.collisions, "_hull.stl", partial(hull_stl, used)),
+        (used.collisions, "_hull.stl", used.hull_stl),
         (visuals, "_simplified.stl", simplify),
     ):
         made = replace_edits(robot.model, robot.meshes, uses, ending, content) if uses else ()
@@ -83,7 +80,7 @@ def dense_collision_mesh(robot: Facts) -> Violations:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
     for used in robot.mesh_files:
-        faces = count_faces(used) if used.collisions else None
+        faces = used.count_faces() if used.collisions else None
         if faces is None or not MAX_COLLISION_FACES < faces <= MAX_STL_FACES:
             continue
         if robot.model.kind == "urdf" and used.mesh.path.suffix.lower() not in MUJOCO_SUFFIXES:
@@ -106,5 +103,4 @@ def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
         or not has_hull(robot.meshes, used.collisions)
     ):
         return None
-    content = partial(hull_stl, used)
-    return replace_edits(robot.model, robot.meshes, used.collisions, "_hull.stl", content)
+    return replace_edits(robot.model, robot.meshes, used.collisions, "_hull.stl", used.hull_stl)

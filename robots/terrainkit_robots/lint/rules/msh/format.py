@@ -1,10 +1,7 @@
 """Rules on the formats of mesh files."""
 
-from functools import partial
-
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.replacement import binary_copy, has_hull, stl_or_hull
-from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
+from terrainkit_robots.analysis.meshes.uses import UsedMesh, has_hull, replace_edits
 from terrainkit_robots.description.fix import make_fix
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.msh.path import not_loaded
@@ -36,8 +33,7 @@ def unsupported_format(robot: Facts) -> Violations:
         uses = used.uses if robot.model.kind == "mjcf" else used.collisions
         edits = None
         if has_hull(robot.meshes, uses):
-            content = partial(stl_or_hull, used)
-            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", content)
+            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", used.stl_or_hull)
         yield Violation(
             element=used,
             message=f"format of {used.label}: got {suffix or 'no suffix'}; expected "
@@ -103,8 +99,9 @@ def ascii_stl(robot: Facts) -> Violations:
     """
     for used in robot.mesh_files:
         if used.header.format == "ascii-stl" and used.header.state == "fine":
-            content = partial(binary_copy, used)
-            edits = replace_edits(robot.model, robot.meshes, used.uses, "_binary.stl", content)
+            edits = replace_edits(
+                robot.model, robot.meshes, used.uses, "_binary.stl", used.binary_copy
+            )
             yield Violation(
                 element=used,
                 message=f"format of {used.label}: got ASCII STL of {used.header.size:,} "
