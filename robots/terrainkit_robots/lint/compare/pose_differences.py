@@ -94,7 +94,7 @@ def compare_link_poses(
         CannotCheckError: if no links match, joint names repeat, or poses are not finite.
     """
     pairs = pair_robots(robot, other)
-    if pairs is None or len(pairs.links) < 2:
+    if len(pairs.links) < 2:
         raise CannotCheckError("the two robots have no links in common")
     positions, other_positions = sample_positions(pairs, poses=poses, seed=seed, locked=locked)
     ours = _relative_to_base(_link_poses(robot, positions, poses), pairs.base[0], poses)

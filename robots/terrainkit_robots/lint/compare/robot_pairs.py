@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.compare.name_pairs import NamePairs, pair_names
@@ -32,10 +34,15 @@ class RobotPairs:
     """Pairs of bodies with the same joints around them."""
 
 
-def pair_robots(robot: Facts, other: Facts) -> RobotPairs | None:
-    """Return the matching elements of two descriptions, or None if one of them has no links."""
-    if not robot.links or not other.links:
-        return None
+def pair_robots(robot: Facts, other: Facts) -> RobotPairs:
+    """Return the matching elements of two descriptions.
+
+    Raises:
+        CannotCheckError: If one of them has no links.
+    """
+    for facts in (robot, other):
+        if not facts.links:
+            raise CannotCheckError(f"{truncate(facts.model.file.name)} has no links")
     by_name, other_by_name = _by_name(robot), _by_name(other)
     names = pair_names(tuple(by_name), tuple(other_by_name))
     joints = tuple((by_name[a], other_by_name[b]) for a, b in names.pairs)

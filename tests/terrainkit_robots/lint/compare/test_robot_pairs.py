@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots, trunk_pose_in_link
 from tests.tables import read_table
 
@@ -56,5 +57,6 @@ def test_virtual_links_are_not_matched(robot_of):
 
 def test_no_links_no_pairs(robot_of):
     empty = robot_of('<robot name="r"></robot>')
-    assert pair_robots(empty, robot_of(TWO)) is None
-    assert pair_robots(robot_of(TWO), empty) is None
+    for pair in ((empty, robot_of(TWO)), (robot_of(TWO), empty)):
+        with pytest.raises(CannotCheckError, match="has no links"):
+            pair_robots(*pair)

@@ -1,13 +1,9 @@
 """Rule on the friction of feet."""
 
-from typing import TYPE_CHECKING
-
 from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Geometry
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
-
-if TYPE_CHECKING:
-    from terrainkit_robots.description.model import Geometry
 
 _MIN_FRICTION, _MAX_FRICTION = 0.1, 10.0
 """Plausible sliding friction of a foot: ice and rubber, with a margin for models with sticky
@@ -31,7 +27,7 @@ def foot_friction(robot: Facts) -> Violations:
     """
     if robot.model.kind != "mjcf":
         return
-    feet: dict[str, tuple[float, Geometry]] = {}
+    feet = dict[str, tuple[float, Geometry]]()
     for leg in robot.legs:
         body = robot.bodies[leg.limb.chain[-1]]
         shapes = [s for s in body.collisions if has_bounds(s.geometry, robot.meshes)]

@@ -2,29 +2,18 @@
 
 import math
 from collections import Counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
+from terrainkit_robots.analysis.bodies.overlap import Overlap
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
-from terrainkit_robots.lint.rule import (
-    Part,
-    Severity,
-    Violation,
-    Violations,
-    findings_of,
-    rule,
-)
+from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.bodies.overlap import Overlap
-    from terrainkit_robots.transforms import Matrix
-
+from terrainkit_robots.transforms import Matrix
 
 _MAX_OVERLAP = 0.001
 """Overlap above which simulators push two bodies apart [m]."""
@@ -96,7 +85,7 @@ def overlap(robot: Facts) -> Violations:
         )
 
 
-def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: "Overlap") -> bool:
+def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: Overlap) -> bool:
     """Return whether neither a leg nor a keyframe defines the pose in which two bodies overlap."""
     first, second = (robot.body_of[name].index for name in pair)
     if robot.model.keyframe or not robot.leg_bodies.isdisjoint((first, second)):
@@ -111,7 +100,7 @@ def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: "Overlap") 
     )
 
 
-def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
+def _group_by_pair(robot: Facts, overlaps: list[Overlap]) -> dict[tuple[str, str], Overlap]:
     """Return the deepest overlap of each pair of bodies."""
     by_pair: dict[tuple[str, str], Overlap] = {}
     for overlap in overlaps:  # sorted by depth, deepest first
@@ -137,7 +126,7 @@ def overlap_in_range(robot: Facts) -> Violations:
     """
     if not robot.joints:
         raise CannotCheckError("there are no moving joints")
-    positions: dict[str, Matrix] = {}
+    positions = dict[str, Matrix]()
     for index, joint in enumerate(robot.joints):
         lower, upper = joint_range(joint)
         if upper - lower > MAX_LIMITED_RANGE:

@@ -3,11 +3,11 @@
 import re
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.simulator_conventions.loading import LoadError, mujoco_load_error
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import (
     Element,
@@ -19,10 +19,6 @@ from terrainkit_robots.lint.rule import (
     rule,
 )
 from terrainkit_robots.text import names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.simulator_conventions.loading import LoadError
-
 
 _EXPLAINED_BY: tuple[tuple[str, str], ...] = (
     (r"mass and inertia of moving bodies", "INR001 INR002 INR003 XML006"),
@@ -75,11 +71,6 @@ def mujoco_load_failure(robot: Facts) -> Violations:
         The file is compiled with the installed version of MuJoCo. If MuJoCo stops at a mesh file of
         a URDF, the file is compiled again with other meshes. Nothing is simulated.
     """
-    from terrainkit_robots.analysis.simulator_conventions.loading import (
-        LoadError,
-        mujoco_load_error,
-    )
-
     if any(robot.meshes.has_contents(path) for path in robot.model.sources):
         raise CannotCheckError("the file has fixes that are not written yet")
     refusals: list[LoadError | None] = []
@@ -139,7 +130,7 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     return best
 
 
-def _load_failure(robot: Facts, refusal: "LoadError", code: str, severity: Severity) -> Violation:
+def _load_failure(robot: Facts, refusal: LoadError, code: str, severity: Severity) -> Violation:
     parts: tuple[Element, ...] = (*robot.model.joints, *robot.model.links)
     elements = {part.name: part for part in parts if part.name}
     source = robot.model.source

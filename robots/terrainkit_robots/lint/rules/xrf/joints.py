@@ -8,6 +8,7 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_mass import relative_difference
+from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 from terrainkit_robots.lint.rule import Part, Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.other_robot import (
     JointPair,
@@ -159,8 +160,6 @@ def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
 
 def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
-    from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
-
     pose = trunk_pose_in_link(robot, link) @ robot.body_of[joint.child].zero_pose
     return pose[:3, :3] @ joint.direction
 

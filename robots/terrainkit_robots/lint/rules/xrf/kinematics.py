@@ -1,13 +1,15 @@
 """Rule that compares the poses of links."""
 
 import math
-from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.lint.compare.pose_differences import (
+    MAX_ANGLE,
+    MAX_DISTANCE,
+    LinkPoseDifference,
+    compare_link_poses,
+)
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
-
-if TYPE_CHECKING:
-    from terrainkit_robots.lint.compare.pose_differences import LinkPoseDifference
 from terrainkit_robots.lint.rules.xrf.joints import joint_difference
 from terrainkit_robots.lint.rules.xrf.other_robot import joint_pairs, other_name, other_robot
 
@@ -25,8 +27,6 @@ def compare_kinematics(robot: Facts) -> Violations:
     Source:
         Both robots are compared in 20 random poses. MuJoCo compiles the frames of an MJCF.
     """
-    from terrainkit_robots.lint.compare.pose_differences import compare_link_poses
-
     held = [a.name for a, b in joint_pairs(robot) if joint_difference(robot, a, b)[2] == "error"]
     gap = compare_link_poses(robot, other_robot(robot), locked=held)
     if gap.is_within_tolerance:
@@ -51,9 +51,7 @@ def compare_kinematics(robot: Facts) -> Violations:
     )
 
 
-def _kinematics_message(gap: "LinkPoseDifference", other: str) -> str:
-    from terrainkit_robots.lint.compare.pose_differences import MAX_ANGLE, MAX_DISTANCE
-
+def _kinematics_message(gap: LinkPoseDifference, other: str) -> str:
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"
     angle = f"{math.degrees(gap.angle):.3g} deg"

@@ -1,34 +1,24 @@
 """The other description of a robot, and the joints that both have."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description.model import Joint
-
-if TYPE_CHECKING:
-    from terrainkit_robots.lint.compare.robot_pairs import RobotPairs
-
+from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, pair_robots
 
 JointPair = tuple[Joint, Joint]
 
 
 @cached_fact
-def robot_pairs(robot: Facts) -> "RobotPairs":
+def robot_pairs(robot: Facts) -> RobotPairs:
     """Return the matching elements of both descriptions.
 
     Raises:
         CannotCheckError: If one of them has no links.
     """
-    from terrainkit_robots.lint.compare.robot_pairs import pair_robots
-
-    pairs = pair_robots(robot, other_robot(robot))
-    if pairs is None:
-        empty = robot if not robot.links else other_robot(robot)
-        raise CannotCheckError(f"{truncate(empty.model.file.name)} has no links")
-    return pairs
+    return pair_robots(robot, other_robot(robot))
 
 
 def joint_pairs(robot: Facts) -> tuple[JointPair, ...]:
