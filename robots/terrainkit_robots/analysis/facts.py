@@ -26,7 +26,6 @@ from terrainkit_robots.analysis.legs.passive_joints import passive_joints
 from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
 from terrainkit_robots.analysis.legs.wheels import is_balanced
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, is_missing, used_meshes
-from terrainkit_robots.analysis.simulator_conventions.fixed_joints import fixed_joints
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
     simulator_orders,
@@ -349,8 +348,14 @@ class Facts:
 
     @cached_property
     def fixed_joints(self) -> tuple[Joint, ...]:
-        """Fixed joints of the main tree of a URDF. Empty for MJCF."""
-        return fixed_joints(self.model.kind, self.tree, self.bodies)
+        """Joints inside the bodies of a URDF: fixed joints and joints of unknown type.
+
+        Empty for MJCF, whose bodies no simulator merges.
+        """
+        if self.model.kind == "mjcf":
+            return ()
+        parent_joint = self.tree.parent_joint
+        return tuple(parent_joint[link.name] for body in self.bodies for link in body.links[1:])
 
     @cached_property
     def file_order(self) -> tuple[str, ...]:
@@ -361,7 +366,7 @@ class Facts:
     @cached_property
     def simulator_orders(self) -> tuple[SimulatorOrder, ...]:
         """The order of joints and bodies in each simulator."""
-        return simulator_orders(self.model, self.tree, self.bodies, self.fixed_joints)
+        return simulator_orders(self)
 
 
 def cached_fact(function: Callable[[Facts], _T]) -> Callable[[Facts], _T]:

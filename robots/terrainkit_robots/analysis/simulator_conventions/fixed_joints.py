@@ -5,14 +5,16 @@ merged body has the name of the parent, and a contact force that is looked up by
 merged link, such as a foot, does not exist.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.model import Joint, Kind
+from terrainkit_robots.description.model import Joint
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 Simulator = Literal["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
 
@@ -35,20 +37,13 @@ class MergedTree:
     """The joints below each body. The joints of a merged link replace the joint above it."""
 
 
-def merge_joints(tree: Tree, bodies: Sequence[Body], merged: AbstractSet[Joint]) -> MergedTree:
-    """Return the main tree below the base with some joints merged.
-
-    Args:
-        tree: The tree of links.
-        bodies: Its bodies, at least one.
-        merged: The joints to merge.
-    """
-    base = bodies[0].top.name
-    links = {link.name for body in bodies for link in body.links}
+def merge_joints(robot: "Facts", merged: Collection[Joint]) -> MergedTree:
+    """Return the main tree of a robot with bodies below its base, with some joints merged."""
+    base, tree = robot.bodies[0].top.name, robot.tree
     body_of = {base: base}
     child_joints: dict[str, list[Joint]] = {base: []}
     for link in tree.order:  # depth first, each after its parent
-        if link == base or link not in links:
+        if link == base or link not in robot.body_of:
             continue
         joint = tree.parent_joint[link]
         parent = body_of[joint.parent]
@@ -65,33 +60,18 @@ def merge_joints(tree: Tree, bodies: Sequence[Body], merged: AbstractSet[Joint])
     )
 
 
-def fixed_joints(kind: Kind, tree: Tree, bodies: Sequence[Body]) -> tuple[Joint, ...]:
-    """Return the joints inside the bodies of a URDF: fixed joints and joints of unknown type.
+def merged_tree(robot: "Facts", simulator: Simulator) -> MergedTree:
+    """Return the main tree with the fixed joints merged that a simulator merges by default.
 
-    Empty for MJCF, whose bodies no simulator merges.
+    MuJoCo, Isaac Lab and Genesis merge, MuJoCo unless the file tells it not to; Isaac Gym merges as
+    configured by legged_gym and its forks; PyBullet does not merge.
     """
-    if kind == "mjcf":
-        return ()
-    return tuple(tree.parent_joint[link.name] for body in bodies for link in body.links[1:])
-
-
-def merged_joints(
-    fixed: Iterable[Joint], simulator: Simulator, *, keeps_fixed_links: bool = False
-) -> frozenset[Joint]:
-    """Return the fixed joints that a simulator merges by default.
-
-    MuJoCo, Isaac Lab and Genesis merge; Isaac Gym merges as configured by legged_gym and its forks;
-    PyBullet does not merge.
-
-    Args:
-        fixed: The fixed joints of a robot.
-        simulator: The simulator.
-        keeps_fixed_links: Whether the file tells MuJoCo to merge none.
-    """
-    if simulator == "PyBullet" or (simulator == "MuJoCo" and keeps_fixed_links):
-        return frozenset()
-    reads_attribute = simulator in _READS_DONT_COLLAPSE
-    return frozenset(joint for joint in fixed if not (joint.dont_collapse and reads_attribute))
+    merged = set(robot.fixed_joints)
+    if simulator == "PyBullet" or (simulator == "MuJoCo" and robot.model.keeps_fixed_links):
+        merged = set()
+    elif simulator in _READS_DONT_COLLAPSE:
+        merged = {joint for joint in merged if not joint.dont_collapse}
+    return merge_joints(robot, merged)
 
 
 def kept_bodies(tree: Tree, body: Body) -> tuple[Body, ...]:

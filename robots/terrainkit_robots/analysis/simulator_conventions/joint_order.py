@@ -25,20 +25,20 @@ If the possible orders of a simulator differ for a robot, the order has to be ve
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from functools import cached_property
+from typing import TYPE_CHECKING
 
-from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     SIMULATORS,
     MergedTree,
     Simulator,
     merge_joints,
-    merged_joints,
+    merged_tree,
 )
-from terrainkit_robots.description.model import JOINT_TYPES, Joint, RobotModel
+from terrainkit_robots.description.model import JOINT_TYPES, Joint
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 _Names = tuple[str, ...]
 _Key = Callable[[Joint], object]
@@ -72,130 +72,114 @@ class SimulatorOrder:
         return self.simulator.lower().replace(" ", "_")
 
 
-def simulator_orders(
-    model: RobotModel, tree: Tree, bodies: Sequence[Body], fixed: Sequence[Joint]
-) -> tuple[SimulatorOrder, ...]:
-    """Return the order in MuJoCo, Isaac Gym, Isaac Lab, Genesis and, for a URDF, PyBullet.
-
-    Args:
-        model: The description.
-        tree: The tree of links.
-        bodies: The bodies, the trunk first.
-        fixed: The fixed joints of the main tree.
-    """
-    robot = _Robot(model=model, tree=tree, bodies=bodies, fixed=fixed)
-    return tuple(robot.order(name) for name in SIMULATORS if name != "PyBullet" or robot.is_urdf)
+def simulator_orders(robot: "Facts") -> tuple[SimulatorOrder, ...]:
+    """Return the order in MuJoCo, Isaac Gym, Isaac Lab, Genesis and, for a URDF, PyBullet."""
+    return tuple(
+        _order(robot, name) for name in SIMULATORS if name != "PyBullet" or _is_urdf(robot)
+    )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Robot:
-    """A robot whose joints are to be ordered."""
+def _is_urdf(robot: "Facts") -> bool:
+    return robot.model.kind != "mjcf"
 
-    model: RobotModel
-    tree: Tree
-    bodies: Sequence[Body]
-    fixed: Sequence[Joint]
 
-    @property
-    def is_urdf(self) -> bool:
-        return self.model.kind != "mjcf"
+def _order(robot: "Facts", simulator: Simulator) -> SimulatorOrder:
+    """Return the likely order of joints and bodies, and whether it is certain."""
+    joints, bodies = _default_order(robot, simulator)
+    certain, reason = _certainty(robot, simulator)
+    return SimulatorOrder(
+        simulator=simulator, joints=joints, bodies=bodies, certain=certain, reason=reason
+    )
 
-    def order(self, simulator: Simulator) -> SimulatorOrder:
-        """Return the likely order of joints and bodies, and whether it is certain."""
-        joints, bodies = self._default_order(simulator)
-        certain, reason = self._certainty(simulator)
-        return SimulatorOrder(
-            simulator=simulator, joints=joints, bodies=bodies, certain=certain, reason=reason
-        )
 
-    def _default_order(self, simulator: Simulator) -> tuple[_Names, _Names]:
-        if not self.bodies:
-            return (), ()
-        key: _Key | None = None
-        if simulator == "Genesis":
-            key = self._file_index
-        elif simulator not in ("MuJoCo", "PyBullet") and self.is_urdf:
-            key = _joint_name
-        keeps = self.model.keeps_fixed_links
-        tree = self._merge(merged_joints(self.fixed, simulator, keeps_fixed_links=keeps))
-        traverse = _breadth_first if simulator == "Isaac Lab" else _depth_first
-        joints = list(traverse(_sort_siblings(tree, key), tree.base))
-        virtual = {link.name for body in self.bodies for link in body.links if link.virtual}
-        body_names = [tree.base, *(joint.child for joint in joints)]
-        return (
-            tuple(joint.name for joint in joints if joint.moves),
-            tuple(name for name in body_names if name not in virtual),
-        )
+def _default_order(robot: "Facts", simulator: Simulator) -> tuple[_Names, _Names]:
+    if not robot.bodies:
+        return (), ()
+    key: _Key | None = None
+    if simulator == "Genesis":
+        key = _file_index(robot)
+    elif simulator not in ("MuJoCo", "PyBullet") and _is_urdf(robot):
+        key = _joint_name
+    tree = merged_tree(robot, simulator)
+    traverse = _breadth_first if simulator == "Isaac Lab" else _depth_first
+    joints = list(traverse(_sort_siblings(tree, key), tree.base))
+    virtual = {link.name for body in robot.bodies for link in body.links if link.virtual}
+    body_names = [tree.base, *(joint.child for joint in joints)]
+    return (
+        tuple(joint.name for joint in joints if joint.moves),
+        tuple(name for name in body_names if name not in virtual),
+    )
 
-    def _certainty(self, simulator: Simulator) -> tuple[bool, str]:
-        """Return whether the order of the joints is known, and the reason."""
-        if self.tree.rejected:
-            return False, "links or joints are missing from the tree"
-        if any(joint.kind not in JOINT_TYPES for joint in self.model.joints):
-            return False, "a joint has an unknown type"
-        match simulator:
-            case "MuJoCo" | "PyBullet":
-                siblings = "joints" if self.is_urdf else "bodies"
-                return True, f"depth first, siblings in the order of their {siblings} in the file"
-            case "Genesis":
-                return True, (
-                    "depth first, siblings as in the file, in genesis-world 1.4.5; "
-                    "older versions are breadth first"
-                )
-            case "Isaac Lab":
-                traverse = _breadth_first
-                first = "breadth first"
-                keys = [_joint_name]
-                known, names = "in importers up to Isaac Sim 5.1", "robot.joint_names"
-            case "Isaac Gym":
-                traverse = _depth_first
-                first = "depth first"
-                keys = [_joint_name, _link_name]
-                known = "in the lists published for A1 and Go1"
-                names = "gym.get_asset_dof_names(asset)"
-        if self._is_unique(traverse, (None, self._file_index, *keys)):
-            return True, f"{first}; {_SAME_ORDER}"
-        likely = f"by the name of the joint, as {known}" if self.is_urdf else "as in the file"
-        return False, f"{first}, siblings {likely}; compare with {names}"
 
-    def _is_unique(
-        self, traverse: Callable[[_ChildJoints, str], Iterator[Joint]], keys: Sequence[_Key | None]
-    ) -> bool:
-        """Return whether all sibling orders and merges lead to the same order of the joints."""
-        if any(body.virtual for body in self.bodies):
-            return False  # importers turn several joints into one
-        orders = {
-            tuple(
-                id(joint) for joint in traverse(_sort_siblings(tree, key), tree.base) if joint.moves
+def _certainty(robot: "Facts", simulator: Simulator) -> tuple[bool, str]:
+    """Return whether the order of the joints is known, and the reason."""
+    if robot.tree.rejected:
+        return False, "links or joints are missing from the tree"
+    if any(joint.kind not in JOINT_TYPES for joint in robot.model.joints):
+        return False, "a joint has an unknown type"
+    match simulator:
+        case "MuJoCo" | "PyBullet":
+            siblings = "joints" if _is_urdf(robot) else "bodies"
+            return True, f"depth first, siblings in the order of their {siblings} in the file"
+        case "Genesis":
+            return True, (
+                "depth first, siblings as in the file, in genesis-world 1.4.5; "
+                "older versions are breadth first"
             )
-            for tree in self._merge_variants()
-            for key in keys
-        }
-        return len(orders) <= 1
+        case "Isaac Lab":
+            traverse = _breadth_first
+            first = "breadth first"
+            keys = [_joint_name]
+            known, names = "in importers up to Isaac Sim 5.1", "robot.joint_names"
+        case "Isaac Gym":
+            traverse = _depth_first
+            first = "depth first"
+            keys = [_joint_name, _link_name]
+            known = "in the lists published for A1 and Go1"
+            names = "gym.get_asset_dof_names(asset)"
+    if _is_unique(robot, traverse, (None, _file_index(robot), *keys)):
+        return True, f"{first}; {_SAME_ORDER}"
+    likely = f"by the name of the joint, as {known}" if _is_urdf(robot) else "as in the file"
+    return False, f"{first}, siblings {likely}; compare with {names}"
 
-    def _merge_variants(self) -> Iterator[MergedTree]:
-        """Yield the tree as importers of different versions merge it.
 
-        They merge all fixed joints, only fixed joints without dont_collapse, only fixed joints
-        above massless links, or none.
-        """
-        if not self.bodies:
-            return
-        massless = {
-            joint
-            for joint in self.fixed
-            if (i := self.tree.links[joint.child].inertial) is None or not i.mass
-        }
-        collapsed = {joint for joint in self.fixed if not joint.dont_collapse}
-        yield from map(self._merge, {frozenset(x) for x in (self.fixed, collapsed, massless, ())})
+def _is_unique(
+    robot: "Facts",
+    traverse: Callable[[_ChildJoints, str], Iterator[Joint]],
+    keys: Sequence[_Key | None],
+) -> bool:
+    """Return whether all sibling orders and merges lead to the same order of the joints."""
+    if any(body.virtual for body in robot.bodies):
+        return False  # importers turn several joints into one
+    orders = {
+        tuple(id(joint) for joint in traverse(_sort_siblings(tree, key), tree.base) if joint.moves)
+        for tree in _merge_variants(robot)
+        for key in keys
+    }
+    return len(orders) <= 1
 
-    def _merge(self, merged: AbstractSet[Joint]) -> MergedTree:
-        return merge_joints(self.tree, self.bodies, merged)
 
-    @cached_property
-    def _file_index(self) -> _Key:
-        """Return the index of a joint in the file."""
-        return {joint: index for index, joint in enumerate(self.model.joints)}.__getitem__
+def _merge_variants(robot: "Facts") -> Iterator[MergedTree]:
+    """Yield the tree as importers of different versions merge it.
+
+    They merge all fixed joints, only fixed joints without dont_collapse, only fixed joints
+    above massless links, or none.
+    """
+    if not robot.bodies:
+        return
+    massless = {
+        joint
+        for joint in robot.fixed_joints
+        if (i := robot.tree.links[joint.child].inertial) is None or not i.mass
+    }
+    collapsed = {joint for joint in robot.fixed_joints if not joint.dont_collapse}
+    for merged in {frozenset(x) for x in (robot.fixed_joints, collapsed, massless, ())}:
+        yield merge_joints(robot, merged)
+
+
+def _file_index(robot: "Facts") -> _Key:
+    """Return the function of a joint that returns its index in the file."""
+    return {joint: index for index, joint in enumerate(robot.model.joints)}.__getitem__
 
 
 def _sort_siblings(tree: MergedTree, key: _Key | None) -> _ChildJoints:

@@ -11,10 +11,7 @@ from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.analysis.inertia.density import default_mass
 from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA
 from terrainkit_robots.analysis.simulator_conventions.armature import GENESIS_ARMATURE
-from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
-    merge_joints,
-    merged_joints,
-)
+from terrainkit_robots.analysis.simulator_conventions.fixed_joints import merged_tree
 from terrainkit_robots.analysis.simulator_conventions.joint_order import SimulatorOrder
 from terrainkit_robots.description.model import WORLD, Link, RobotModel
 
@@ -69,9 +66,7 @@ def loaded_robots(robot: Facts) -> tuple[LoadedRobot, ...]:
 
 def _loaded(robot: Facts, order: SimulatorOrder) -> LoadedRobot:
     model, simulator = robot.model, order.simulator
-    keeps = model.keeps_fixed_links
-    joints = merged_joints(robot.fixed_joints, simulator, keeps_fixed_links=keeps)
-    body_of = merge_joints(robot.tree, robot.bodies, joints).body_of
+    body_of = merged_tree(robot, simulator).body_of
     merged = {link: body for link, body in body_of.items() if link != body}
     bodies = order.bodies
     mass = robot.total_mass
@@ -83,7 +78,7 @@ def _loaded(robot: Facts, order: SimulatorOrder) -> LoadedRobot:
         losses += _bullet_losses(model, bare)
     elif simulator == "MuJoCo":
         # The trunk of a welded robot is a part of the world, with everything fixed to it.
-        is_static = is_welded(robot) and not keeps
+        is_static = is_welded(robot) and not model.keeps_fixed_links
         static = {link.name for link in robot.bodies[0].links} if is_static else set()
         bodies = tuple(name for name in bodies if name not in static)
         merged |= dict.fromkeys(static, WORLD)

@@ -2,16 +2,10 @@ import pytest
 
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     kept_bodies,
-    merge_joints,
-    merged_joints,
+    merged_tree,
 )
 from tests.small_robots import facts, mjcf, tree_text
 from tests.tables import read_table
-
-
-def merged_tree(robot, simulator):
-    merged = merged_joints(robot.fixed_joints, simulator)
-    return merge_joints(robot.tree, robot.bodies, merged)
 
 
 @pytest.mark.parametrize(("simulator", "bodies"), read_table(__file__, "attribute_keeps_a_link"))
