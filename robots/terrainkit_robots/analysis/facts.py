@@ -205,13 +205,10 @@ class Facts:
         """Return the nearest ancestor of a body that is not virtual."""
         return physical_parent(self.bodies, body)
 
-    @cached_property
-    def _parents(self) -> frozenset[int | None]:
-        return frozenset(body.parent for body in self.bodies)
-
     def is_wheel(self, body: Body) -> bool:
         """Return whether a body is a wheel or a propeller."""
-        return is_balanced(body, self._parents) or body.index in self.wheels
+        is_end = all(other.parent != body.index for other in self.bodies)
+        return (is_end and is_balanced(body)) or body.index in self.wheels
 
     @cached_property
     def wheels(self) -> frozenset[int]:
@@ -248,8 +245,7 @@ class Facts:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
         actuated = self.joints if has_tendons else self._maybe_actuated
-        loops = [loop.bodies for loop in self.loops]
-        return detect_limbs(self.tree, self.bodies, actuated, self.meshes, loops)
+        return detect_limbs(self, actuated)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
@@ -320,12 +316,12 @@ class Facts:
     @cached_property
     def mirror_map(self) -> "Mapping[str, MirrorJoint]":
         """The mirrored joint of each actuated joint that has one, by name."""
-        return mirror_map(self.bodies, self.actuated, self.mirror)
+        return mirror_map(self)
 
     @cached_property
     def mirror_pairs(self) -> tuple[MirrorPair, ...]:
         """The pairs of mirrored joints, parents first."""
-        return mirror_pairs(self.bodies, self.mirror, self.leg_bodies)
+        return mirror_pairs(self)
 
     @cached_property
     def copied_pairs(self) -> tuple[MirrorPair, ...]:

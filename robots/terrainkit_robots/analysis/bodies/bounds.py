@@ -38,7 +38,6 @@ class BodyBounds:
                 point = body.origin[:3, :3] @ anchor + body.origin[:3, 3]
                 self._frames[body.parent].append(point)
         origins = np.array([body.zero_pose[:3, 3] for body in bodies]).reshape(-1, 3)
-        self._primitive_boxes: dict[int, Matrix | None] = {}
         self.robot_size: float = (
             float(np.linalg.norm(np.ptp(origins, axis=0))) if len(origins) else 0.0
         )
@@ -84,7 +83,7 @@ class BodyBounds:
     def _boxes(self, body: Body) -> Iterator[Matrix]:
         shapes = (*body.collisions, *body.visuals)
         box = _point_box(self._frames[body.index])
-        primitives = self._primitive_box(body)
+        primitives = bounds([s for s in shapes if s.geometry.shape != "mesh"], self._meshes)
         if primitives is not None:
             box = _union(box, primitives)
             yield box
@@ -98,13 +97,6 @@ class BodyBounds:
         if not self._is_readable(shapes):
             box = _pad(box, _MAX_UNREADABLE_RATIO * self.robot_size or _UNKNOWN_SIZE)
         yield box
-
-    def _primitive_box(self, body: Body) -> Matrix | None:
-        if body.index not in self._primitive_boxes:
-            shapes = (*body.collisions, *body.visuals)
-            primitives = [shape for shape in shapes if shape.geometry.shape != "mesh"]
-            self._primitive_boxes[body.index] = bounds(primitives, self._meshes)
-        return self._primitive_boxes[body.index]
 
     def _length(self, body: Body) -> float:
         """Estimate the length of a body from the joints on it and above it [m]."""

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
-from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.legs.wheels import is_leg_wheel
 from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 # Two of three criteria: near the ground, a mirror image, names of legs.
 MIN_LEG_SCORE = 1.5
@@ -110,27 +113,19 @@ class Limb(Chain):
     """Whether its names suggest another limb than a leg."""
 
 
-def detect_limbs(
-    tree: Tree,
-    bodies: Sequence[Body],
-    actuated: Sequence[Joint],
-    meshes: Meshes,
-    loops: Sequence[tuple[int, int]] = (),
-) -> tuple[Limb, ...]:
+def detect_limbs(robot: "Facts", actuated: Sequence[Joint]) -> tuple[Limb, ...]:
     """Return the limbs of a robot in the order of its bodies.
 
     Args:
-        tree: The tree of links.
-        bodies: The bodies, parents first.
+        robot: The robot.
         actuated: Joints that an actuator moves, directly or perhaps through a tendon.
-        meshes: Mesh files.
-        loops: Indices of the two bodies that each loop connects.
     """
+    bodies, meshes = robot.bodies, robot.meshes
     if not bodies:
         return ()
     lower, upper = _robot_bounds(bodies, meshes)
     size = max(float(np.linalg.norm(upper - lower)), 1e-6)
-    chains = _join_loops(_chains(bodies, meshes), loops, bodies, size)
+    chains = _join_loops(_chains(bodies, meshes), robot, size)
     leaves = _leaves(chains, bodies, actuated)
     if not leaves:
         return ()
@@ -149,7 +144,7 @@ def detect_limbs(
     surrounding = _surrounding(leaves, bodies, size)
     # The slides of a planar model move its base.
     is_planar = any(body.parent == 0 and body.virtual for body in bodies)
-    is_fixed_base = tree.order[0] == bodies[0].top.name == WORLD and not is_planar
+    is_fixed_base = robot.tree.order[0] == bodies[0].top.name == WORLD and not is_planar
 
     def height_score(leaf: Chain) -> float:
         foot = float(leaf.tip[2])
@@ -290,20 +285,15 @@ def _ends(bodies: Sequence[Body], meshes: Meshes) -> list[Body]:
     return [bodies[index] for index in sorted(ends | set(feet))]
 
 
-def _join_loops(
-    chains: Sequence[Chain],
-    loops: Sequence[tuple[int, int]],
-    bodies: Sequence[Body],
-    size: float,
-) -> list[Chain]:
+def _join_loops(chains: Sequence[Chain], robot: "Facts", size: float) -> list[Chain]:
     """Return the chains with the numbers of the limbs that loops join them to.
 
     A loop joins the branches of each body that it moves. A waist joins no limbs: it carries limbs
     that are mirror images.
     """
     numbers: dict[int, int] = {}
-    for number, loop in enumerate(loops):
-        ends = [set(ancestors(bodies, index)) for index in loop]
+    for number, loop in enumerate(robot.loops):
+        ends = [set(ancestors(robot.bodies, index)) for index in loop.bodies]
         joined = {
             k
             for index in ends[0] ^ ends[1]

@@ -1,7 +1,6 @@
 """Tell wheels from other bodies."""
 
 import math
-from collections.abc import Collection
 
 import numpy as np
 
@@ -34,14 +33,9 @@ def turns_without_limits(joint: Joint) -> bool:
     return joint.kind != "prismatic" and bool(upper - lower > MAX_LIMITED_RANGE)
 
 
-def is_balanced(body: Body, parents: Collection[int | None]) -> bool:
-    """Return whether a body without children is balanced on its axis, as a wheel or a propeller is.
-
-    Args:
-        body: The body.
-        parents: Indices of all bodies with children.
-    """
-    if body.joint is None or body.index in parents:
+def is_balanced(body: Body) -> bool:
+    """Return whether a body is balanced on its axis, as a wheel or a propeller is."""
+    if body.joint is None:
         return False
     # Half of the trace is the polar second moment m r^2 of the mass about its center.
     moment = float(np.trace(body.inertia)) / 2

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.bodies import BodyShape
 from terrainkit_robots.analysis.bodies.shapes import bounds
-from terrainkit_robots.analysis.bodies.tree import Tree
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.uses import MeshUse
 from terrainkit_robots.description.model import Geometry
-from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
+from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.transforms import Matrix
 
 MAX_RATIO, MAX_PLAUSIBLE_RATIO = 15.0, 50.0
@@ -69,19 +69,11 @@ class ScaleMismatch:
 class MeshScales:
     """The lengths of a robot that meshes are compared with."""
 
-    def __init__(self, tree: Tree, bodies: Sequence[Body], meshes: Meshes) -> None:
-        """Measure a robot.
-
-        Args:
-            tree: The tree of links.
-            bodies: The bodies, the trunk first.
-            meshes: Mesh files.
-        """
-        self._tree, self._meshes = tree, meshes
-        self._trunk_links = {link.name for link in bodies[0].links} if bodies else set()
-        points = np.array([np.zeros(3), *(body.zero_pose[:3, 3] for body in bodies)])
-        is_valid = (np.abs(points) < _MAX_LENGTH).all()
-        self.robot_size = _length(np.ptp(points, axis=0)) if is_valid else 0.0
+    def __init__(self, robot: Facts) -> None:
+        self._tree, self._meshes = robot.tree, robot.meshes
+        self._trunk_links = {link.name for body in robot.bodies[:1] for link in body.links}
+        size = robot.body_bounds.robot_size
+        self.robot_size = size if size < _MAX_LENGTH else 0.0
         """Diagonal of the bounding box of all joints, all joints at 0 [m]. 0 if it is invalid."""
 
     def mismatch(self, use: MeshUse) -> ScaleMismatch | None:

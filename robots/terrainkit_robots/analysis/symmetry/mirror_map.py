@@ -1,47 +1,38 @@
 """Compute the mirrored joint of each joint, and the sign between the two."""
 
-from collections.abc import Sequence
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.symmetry.mirror import MAX_MIRROR_ERROR, Mirror, Sign
-from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.robot_spec import MirrorJoint
 
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
-def mirror_map(
-    bodies: Sequence[Body], actuated: Sequence[Joint], mirror: Mirror
-) -> dict[str, MirrorJoint]:
+
+def mirror_map(robot: "Facts") -> dict[str, MirrorJoint]:
     """Return the mirrored joint of each actuated joint that has one, by name.
 
     A joint in the mirror plane mirrors itself: with sign -1 if it yaws, with +1 if it pitches.
-
-    Args:
-        bodies: The bodies, the trunk first.
-        actuated: The actuated joints.
-        mirror: The mirror plane.
     """
-    names = {joint.name for joint in actuated}
-    points = np.array([body.zero_pose[:3, 3] for body in bodies]).reshape(-1, 3)
-    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-    tolerance = max(MAX_MIRROR_ERROR * size, 1e-3)
+    names = {joint.name for joint in robot.actuated}
+    tolerance = max(MAX_MIRROR_ERROR * robot.body_bounds.robot_size, 1e-3)
     found: dict[str, MirrorJoint] = {}
-    for body in bodies:
+    for body in robot.bodies:
         joint = body.joint
         if joint is None or joint.name not in names:
             continue
-        image = mirror.image_body(body.index)
+        image = robot.mirror.image_body(body.index)
         if image is None:
-            sign = _self_sign(mirror, body, tolerance)
+            sign = _self_sign(robot.mirror, body, tolerance)
             if sign:
                 found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
-        other, sign = bodies[image[0]].joint, image[1]
+        other, sign = robot.bodies[image[0]].joint, image[1]
         if sign and other is not None and other.name in names:
             found[joint.name] = MirrorJoint(joint=other.name, sign=sign)
-    return {joint.name: found[joint.name] for joint in actuated if joint.name in found}
+    return {joint.name: found[joint.name] for joint in robot.actuated if joint.name in found}
 
 
 def _self_sign(mirror: Mirror, body: Body, tolerance: float) -> Sign:

@@ -1,7 +1,7 @@
 """Compute the pairs of mirrored joints, and which joint of a pair is the outlier."""
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -125,41 +125,35 @@ class MirrorPair:
         return MAX_COM_ERROR + _COM_ERROR_SHARE * min(radii)
 
 
-def mirror_pairs(
-    bodies: Sequence[Body], mirror: Mirror, leg_bodies: Collection[int]
-) -> tuple[MirrorPair, ...]:
+def mirror_pairs(robot: "Facts") -> tuple[MirrorPair, ...]:
     """Return the pairs of mirrored joints, parents first.
 
     Outside of the legs the names have to be mirrored too: two fingers of a hand, for example, only
     happen to be at mirrored positions.
-
-    Args:
-        bodies: The bodies, the trunk first.
-        mirror: The mirror plane.
-        leg_bodies: Indices of the bodies of legs.
     """
     found = []
-    for pair in mirror.pairs:
-        left, right = (_mirror_joint(bodies, mirror, index) for index in (pair.left, pair.right))
+    for pair in robot.mirror.pairs:
+        left, right = (_mirror_joint(robot, index) for index in (pair.left, pair.right))
         if left is None or right is None:
             continue
         has_mirrored_names = (
             swap_sides(left.body.name) == right.body.name
             or swap_sides(left.joint.name) == right.joint.name
         )
-        if (pair.left in leg_bodies and pair.right in leg_bodies) or has_mirrored_names:
+        if robot.leg_bodies.issuperset((pair.left, pair.right)) or has_mirrored_names:
             found.append(MirrorPair(left=left, right=right, sign=pair.sign))
     return tuple(found)
 
 
-def _mirror_joint(bodies: Sequence[Body], mirror: Mirror, index: int) -> MirrorSide | None:
-    body, pose = bodies[index], bodies[index].zero_pose
+def _mirror_joint(robot: "Facts", index: int) -> MirrorSide | None:
+    body, mirror = robot.bodies[index], robot.mirror
     if body.joint is None or body.parent is None:
         return None
-    parent = bodies[body.parent]
+    parent = robot.bodies[body.parent]
     origin = joint_axis(parent, parent.zero_pose)[0] if parent.joint else parent.zero_pose[:3, 3]
     if parent.index not in mirror.image_index:  # on the mirror plane
         origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
+    pose = body.zero_pose
     point, axis = joint_axis(body, pose)
     return MirrorSide(
         body=body,

@@ -27,7 +27,7 @@ def mismatches(*links, reach=0.3):
     ]
     joints = [joint(f"l{k}", f"l{k + 1}", f"0 0 {-reach}") for k in range(len(links) - 1)]
     robot = facts(*parts, *joints)
-    scales = MeshScales(robot.tree, robot.bodies, robot.meshes)
+    scales = MeshScales(robot)
     found = [scales.mismatch(use) for use in mesh_uses(robot.model)]
     return [each.ratio for each in found if each is not None]
 

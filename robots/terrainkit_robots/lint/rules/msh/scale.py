@@ -31,7 +31,7 @@ def wrong_scale(robot: Facts) -> Violations:
     Source:
         STL has no unit; URDF and MJCF use meters.
     """
-    scales = MeshScales(robot.tree, robot.bodies, robot.meshes)
+    scales = MeshScales(robot)
     files = robot.mesh_files
     if files and scales.robot_size <= 0:
         raise CannotCheckError("all joints have the same position, so the size is unknown")
