@@ -80,6 +80,11 @@ class Body(BodyFrame):
         center: Matrix = np.sum(weighted, axis=0) / self.mass
         return center
 
+    @property
+    def zero_center(self) -> Matrix:
+        """Return the center of mass in the frame of the trunk, all joints at 0, shape (3,) [m]."""
+        return np.asarray(self.zero_pose[:3, :3] @ self.center + self.zero_pose[:3, 3])
+
     @cached_property
     def inertia(self) -> Matrix:
         """Inertia about the center of mass, in the axes of the body, shape (3, 3) [kg m2]."""

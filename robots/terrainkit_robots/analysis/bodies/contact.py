@@ -1,7 +1,5 @@
 """Compute which points of a body touch level ground."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
@@ -36,7 +34,12 @@ def contact_points(body: Body, pose: Matrix, meshes: Meshes) -> Matrix:
     Returns:
         Points in the frame of `pose`, shape (n, 3) [m].
     """
-    points = _candidate_points(body.collisions, pose, meshes)
+    candidates = [
+        _extreme_points(shape, pose @ shape.pose, meshes)
+        for shape in body.collisions
+        if has_bounds(shape.geometry, meshes)
+    ]
+    points = np.concatenate([np.zeros((0, 3)), *candidates])
     if not len(points):
         points = np.array([(pose @ local)[:3, 3] for local in body.poses])
         return np.asarray(points[points[:, 2].argmin()][None])
@@ -73,15 +76,6 @@ def flat_foot_angle(body: Body, pose: Matrix, axis: Matrix, meshes: Meshes) -> f
         last += 1
     # A ball is flat at all angles; for a foot take the middle of the flat interval.
     return 0.0 if last - first > len(flat) // 2 else float(_ANGLES[[first, last]].mean())
-
-
-def _candidate_points(shapes: Iterable[BodyShape], pose: Matrix, meshes: Meshes) -> Matrix:
-    points = [
-        _extreme_points(shape, pose @ shape.pose, meshes)
-        for shape in shapes
-        if has_bounds(shape.geometry, meshes)
-    ]
-    return np.concatenate(points) if points else np.zeros((0, 3))
 
 
 def _extreme_points(shape: BodyShape, pose: Matrix, meshes: Meshes) -> Matrix:

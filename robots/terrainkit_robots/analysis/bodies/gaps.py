@@ -37,9 +37,3 @@ def box_distance(a: Matrix, b: Matrix) -> float:
         b: The other box or point.
     """
     return float(np.linalg.norm(np.maximum(0, np.maximum(a[0] - b[-1], b[0] - a[-1]))))
-
-
-def gap_between(bodies: Sequence[Body], meshes: Meshes) -> float | None:
-    """Return the gap between two bodies [m], or None if it is unknown."""
-    a, b = (box_at_zero(body, shapes_of(body), meshes) for body in bodies)
-    return None if a is None or b is None else box_distance(a, b)

@@ -31,11 +31,7 @@ def has_derived_mass(body: Body) -> bool:
 
 def check_max_density(body: Body, body_bounds: BodyBounds) -> tuple[float, float] | None:
     """Return the volume of the bounding box [m3] and MAX_DENSITY if a body is too heavy for it."""
-
-    def has_high_density(box: Matrix) -> bool:
-        return body.mass > MAX_DENSITY * _box_volume(box)
-
-    box = body_bounds.box_if(body, has_high_density)
+    box = body_bounds.box_if(body, lambda box: body.mass > MAX_DENSITY * _box_volume(box))
     return None if box is None or _box_volume(box) <= 0 else (_box_volume(box), MAX_DENSITY)
 
 

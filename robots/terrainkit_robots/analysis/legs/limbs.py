@@ -19,6 +19,7 @@ from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
 from terrainkit_robots.analysis.legs.wheels import is_leg_wheel
 from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.text import group
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
@@ -266,9 +267,7 @@ def _ends(bodies: Sequence[Body], meshes: Meshes) -> list[Body]:
 
     A foot carries rods or toes and no longer chains.
     """
-    children: dict[int, list[int]] = {}
-    for body in bodies[1:]:
-        children.setdefault(body.parent or 0, []).append(body.index)
+    children = group((body.parent or 0, body.index) for body in bodies[1:])
 
     def bottom(index: int) -> float:
         body = bodies[index]

@@ -119,9 +119,7 @@ def _force_points(
         np.clip(contact + shift, points.min(axis=0), points.max(axis=0))
         for contact, points in zip(contacts, sole_points, strict=True)
     ]
-    return np.array(
-        [[*point[:2], contact[2]] for point, contact in zip(shifted, contacts, strict=True)]
-    )
+    return np.column_stack([np.array(shifted)[:, :2], contacts[:, 2]])
 
 
 def _static_torques(

@@ -180,18 +180,13 @@ def _normal_of_sides(sides: Sequence[tuple[Body, Body]]) -> Matrix:
 
     The centers of mass are compared, since the slides of two fingers may start at one point.
     """
-    to_left = sum((_center(left) - _center(right) for left, right in sides), np.zeros(3))
+    to_left = sum((left.zero_center - right.zero_center for left, right in sides), np.zeros(3))
     axis = int(np.argmax(np.abs(to_left)))
     if abs(to_left[axis]) <= abs(to_left[1]) + 1e-9:  # also without such names
         return np.array([0, 1.0, 0])
     normal = np.zeros(3)
     normal[axis] = np.sign(to_left[axis])
     return normal
-
-
-def _center(body: Body) -> Matrix:
-    """Return the center of mass in the frame of the trunk, all joints at zero, shape (3,) [m]."""
-    return np.asarray(body.zero_pose[:3, :3] @ body.center + body.zero_pose[:3, 3])
 
 
 def _sprawls(leg: Leg) -> bool:

@@ -40,8 +40,7 @@ def _self_sign(mirror: Mirror, body: Body, tolerance: float) -> Sign:
     assert body.joint is not None
     pose = body.zero_pose
     anchor, axis = joint_axis(body, pose)
-    center = pose[:3, :3] @ body.center + pose[:3, 3]
-    points = (anchor, pose[:3, 3], center)
+    points = (anchor, pose[:3, 3], body.zero_center)
     if min(abs(float(point @ mirror.normal) - mirror.offset) for point in points) > tolerance:
         return 0
     return mirror.joint_sign(body.joint, axis, axis)

@@ -153,15 +153,14 @@ def _mirror_joint(robot: "Facts", index: int) -> MirrorSide | None:
     origin = joint_axis(parent, parent.zero_pose)[0] if parent.joint else parent.zero_pose[:3, 3]
     if parent.index not in mirror.image_index:  # on the mirror plane
         origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
-    pose = body.zero_pose
-    point, axis = joint_axis(body, pose)
+    point, axis = joint_axis(body, body.zero_pose)
     return MirrorSide(
         body=body,
         joint=body.joint,
         point=point,
         axis=axis,
         offset=point - origin,
-        arm=pose[:3, :3] @ body.center + pose[:3, 3] - point,
+        arm=body.zero_center - point,
     )
 
 

@@ -97,11 +97,11 @@ def compare_link_poses(
     if len(pairs.links) < 2:
         raise CannotCheckError("the two robots have no links in common")
     positions, other_positions = sample_positions(pairs, poses=poses, seed=seed, locked=locked)
-    ours = _relative_to_base(_link_poses(robot, positions, poses), pairs.base[0], poses)
-    theirs = _relative_to_base(_link_poses(other, other_positions, poses), pairs.base[1], poses)
-    a = np.array([ours[name] for name, _ in pairs.links])
-    b = np.array([theirs[name] for _, name in pairs.links])
     with np.errstate(all="ignore"):
+        ours = _link_poses(robot, positions, pairs.base[0], poses)
+        theirs = _link_poses(other, other_positions, pairs.base[1], poses)
+        a = np.array([ours[name] for name, _ in pairs.links])
+        b = np.array([theirs[name] for _, name in pairs.links])
         return _difference(a, b, pairs, seed)
 
 
@@ -134,7 +134,10 @@ def _bounds(joint: Joint, other: Joint) -> tuple[float, float]:
     return lower, upper
 
 
-def _link_poses(robot: Facts, positions: Mapping[str, Matrix], count: int) -> dict[str, Matrix]:
+def _link_poses(
+    robot: Facts, positions: Mapping[str, Matrix], base: str, count: int
+) -> dict[str, Matrix]:
+    """Return the pose of each link in the frame of the base, shape (count, 4, 4), by name."""
     for name, times in Counter(joint.name for joint in robot.joints).items():
         if times > 1:
             raise CannotCheckError(f"{robot.model.file.name} has {times} joints called {name}")
@@ -143,14 +146,9 @@ def _link_poses(robot: Facts, positions: Mapping[str, Matrix], count: int) -> di
         replace(body, joint=None if body.joint is None else replace(body.joint, mimic=None))
         for body in robot.bodies
     ]
-    return link_poses(free, positions, count=count)
-
-
-def _relative_to_base(poses: Mapping[str, Matrix], base: str, count: int) -> dict[str, Matrix]:
-    """Return poses in the frame of the base, shape (count, 4, 4) each."""
-    with np.errstate(all="ignore"):
-        inverse = invert_poses(poses[base])
-        return {name: np.broadcast_to(inverse @ p, (count, 4, 4)) for name, p in poses.items()}
+    poses = link_poses(free, positions, count=count)
+    inverse = invert_poses(poses[base])
+    return {name: inverse @ pose for name, pose in poses.items()}
 
 
 def _difference(a: Matrix, b: Matrix, pairs: RobotPairs, seed: int) -> LinkPoseDifference:

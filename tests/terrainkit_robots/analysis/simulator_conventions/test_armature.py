@@ -17,7 +17,7 @@ def test_inertias_of_point_mass_on_rod():
         f'<body name="tip" pos="0.5 0 0"><joint name="j2" axis="0 0 3"/>{inertial}</body>'
         "</body></body>"
     )
-    moved = inertia_without_armature(robot.bodies, robot.actuated)
+    moved = inertia_without_armature(robot)
     by_name = {joint.name: inertia for joint, inertia in moved.items()}
     assert by_name == pytest.approx({"j1": 0.501, "j2": 0.001}, rel=1e-6)
 
@@ -28,7 +28,7 @@ def test_inertias_exclude_joints_with_armature():
         f'<body name="b"><freejoint/>{geom}<body name="a">{geom}<joint name="j" armature="0.01"/>'
         f'</body><body name="s">{geom}<joint name="slide" type="slide"/></body></body>'
     )
-    ((joint, inertia),) = inertia_without_armature(robot.bodies, robot.actuated).items()
+    ((joint, inertia),) = inertia_without_armature(robot).items()
     assert (joint.name, inertia) == ("slide", pytest.approx(1.0))
 
 
@@ -41,6 +41,6 @@ def test_inertias_match_mass_matrix_of_mujoco(name):
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, matrix)
     robot = facts(path.read_text())
-    moved = inertia_without_armature(robot.bodies, robot.actuated)
+    moved = inertia_without_armature(robot)
     places = [model.joint(joint.name).dofadr[0] for joint in moved]
     assert list(moved.values()) == pytest.approx(np.diag(matrix)[places], rel=1e-6)

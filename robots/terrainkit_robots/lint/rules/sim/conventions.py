@@ -55,15 +55,15 @@ def simulator_defaults(robot: Facts) -> Violations:
         published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
         marked as unverified. Inertias are those of all links below a joint, all joints at 0.
     """
-    parts = [*_order(robot), *_feet(robot), *_trunk(robot)]
+    file = robot.file_order
+    others = [order for order in robot.simulator_orders if order.joints != file]
+    parts = [*_order(others, file), *_feet(robot), *_trunk(robot)]
     if not any(findings_of(robot, "UNI001", "UNI002", "UNI003")):  # else, inertias say nothing
         parts += _armature(robot)
     if robot.legs and (joints := joints_without_zero(robot)):
         listed = names((joint.name for joint in joints), 4)
         parts.append(f"joints start at 0, which is outside of the limits of {listed}")
     if parts:
-        file = robot.file_order
-        others = [order for order in robot.simulator_orders if order.joints != file]
         yield Violation(
             message="; ".join(parts),
             certainty="proven" if all(order.certain for order in others) else "likely",
@@ -71,10 +71,8 @@ def simulator_defaults(robot: Facts) -> Violations:
         )
 
 
-def _order(robot: Facts) -> Iterator[str]:
-    """Yield how simulators order the joints."""
-    file = robot.file_order
-    others = [order for order in robot.simulator_orders if order.joints != file]
+def _order(others: Sequence[SimulatorOrder], file: Sequence[str]) -> Iterator[str]:
+    """Yield how simulators with another order than the file order the joints."""
     if others:
         orders = "; ".join(_format_order(order, file) for order in others)
         yield f"joint order, as indices into the file's order: {orders}"
@@ -117,7 +115,7 @@ def _trunk(robot: Facts) -> Iterator[str]:
 
 def _armature(robot: Facts) -> Iterator[str]:
     """Yield that the armature of Genesis is larger than the inertia that joints move."""
-    moved = inertia_without_armature(robot.bodies, robot.actuated)
+    moved = inertia_without_armature(robot)
     slowed = [inertia for inertia in moved.values() if inertia < GENESIS_ARMATURE]
     if slowed:
         joint = min(moved, key=moved.__getitem__)

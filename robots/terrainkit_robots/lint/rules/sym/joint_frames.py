@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.gaps import gap_between
+from terrainkit_robots.analysis.bodies.gaps import box_at_zero, box_distance, shapes_of
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_AXIS_ERROR,
@@ -143,7 +143,10 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
 
     def gap(body: Body) -> float | None:
         parent = robot.physical_parent(body) if error.distance else None
-        return None if parent is None else gap_between((parent, body), robot.meshes)
+        if parent is None:
+            return None
+        a, b = (box_at_zero(side, shapes_of(side), robot.meshes) for side in (parent, body))
+        return None if a is None or b is None else box_distance(a, b)
 
     odd, other, reason = outlier_first(robot, error.pair, value, gap)
     name, mirror = odd.joint.name, other.joint.name

@@ -117,8 +117,7 @@ def com_asymmetry(robot: Facts) -> Violations:
 def _shape_offset(robot: Facts, body: Body) -> float | None:
     """Return the distance of the center of mass from the middle of the shapes [m]."""
     box = box_at_zero(body, shapes_of(body), robot.meshes)
-    center = body.zero_pose[:3, :3] @ body.center + body.zero_pose[:3, 3]
-    return None if box is None else float(np.linalg.norm(box.mean(axis=0) - center))
+    return None if box is None else float(np.linalg.norm(box.mean(axis=0) - body.zero_center))
 
 
 def _trunk_offset(robot: Facts) -> Violations:

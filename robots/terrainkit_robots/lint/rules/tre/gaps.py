@@ -81,8 +81,7 @@ def _collision_box(robot: Facts, body: Body) -> Matrix:
 
 def _with_frame(body: Body, box: Matrix) -> Matrix:
     """Return a box that also contains the origin and the center of mass of a body."""
-    pose = body.zero_pose
-    points = np.vstack([box, pose[:3, 3], pose[:3, :3] @ body.center + pose[:3, 3]])
+    points = np.vstack([box, body.zero_pose[:3, 3], body.zero_center])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
