@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass, subtree_of
+from terrainkit_robots.analysis.bodies.bodies import center_of_mass, subtree_of
 from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import min_height
@@ -70,9 +70,9 @@ def compute_stance(robot: "Facts", positions: Mapping[str, float], *, total_mass
         positions: Position of each moving joint [rad] or [m], by name.
         total_mass: Total declared mass [kg]. NaN if a mass is unknown.
     """
-    bodies, legs = robot.bodies, robot.legs
+    bodies = robot.bodies
     poses = body_poses(bodies, positions)
-    feet = [leg.limb.chain[-1] for leg in legs]
+    feet = [leg.limb.chain[-1] for leg in robot.legs]
     soles = [contact_points(bodies[i], poses[i], robot.meshes) for i in feet]
     contacts = np.array([points.mean(axis=0) for points in soles])
     heights = [
@@ -94,7 +94,7 @@ def compute_stance(robot: "Facts", positions: Mapping[str, float], *, total_mass
         support=support,
         center=center,
         margin=margin(center[:2], support) if is_known else math.nan,
-        torques=_static_torques(bodies, legs, poses, force_points, forces) if is_known else {},
+        torques=_static_torques(robot, poses, force_points, forces) if is_known else {},
     )
 
 
@@ -123,23 +123,20 @@ def _force_points(
 
 
 def _static_torques(
-    bodies: Sequence[Body],
-    legs: Sequence[Leg],
-    poses: Sequence[Matrix],
-    force_points: Matrix,
-    forces: Matrix,
+    robot: "Facts", poses: Sequence[Matrix], force_points: Matrix, forces: Matrix
 ) -> dict[str, float]:
     """Return the torque of each joint of the legs that balances gravity and the ground forces."""
+    bodies = robot.bodies
     up = np.array([0.0, 0.0, 1.0])
     torques: dict[str, float] = {}
-    for index in sorted({index for leg in legs for index in leg.limb.chain}):
+    for index in sorted(robot.leg_bodies):
         joint = bodies[index].joint
         if joint is None or not joint.moves:
             continue
         # A waist carries the loads of all legs below it.
         loads = [
             (point, force * up)
-            for leg, point, force in zip(legs, force_points, forces, strict=True)
+            for leg, point, force in zip(robot.legs, force_points, forces, strict=True)
             if index in leg.limb.chain
         ]
         for descendant in sorted(subtree_of(bodies, index)):

@@ -141,6 +141,37 @@ class UsedMesh:
             # The number of faces grows with the square of the number of cells.
             cells = max(1, int(cells * min(0.9, share**0.5)))
 
+    def has_hull(self, uses: Sequence[MeshUse]) -> bool:
+        """Return whether it is readable and has a convex hull at the scale of each of some uses."""
+        try:
+            return not any(self.meshes.is_flat(use.mesh) for use in uses)
+        except MeshError:
+            return False
+
+    def replace_edits(
+        self, model: RobotModel, uses: Sequence[MeshUse], suffix: str, content: Callable[[], bytes]
+    ) -> tuple[Edit, ...] | None:
+        """Return the edits that write a new mesh beside this one and refer to it instead.
+
+        Args:
+            model: The description.
+            uses: The uses that refer to the new mesh, at least one.
+            suffix: End of the new name, which replaces the suffix of the file: `_hull.stl`.
+            content: Returns the content of the new file.
+
+        Returns:
+            The edits, or None if the uses are not editable.
+        """
+        mesh = uses[0].mesh
+        target = _unused_path(self.meshes, mesh.path, suffix)
+        if model.kind == "mjcf":  # names are relative to meshdir, which does not change
+            folder = mesh.filename.replace("\\", "/").rpartition("/")
+            name = f"{folder[0]}{folder[1]}{target.name}"
+        else:
+            name = relative_name(model, target)
+        edits = rename_edits(model, uses, name)
+        return None if edits is None else (WriteFile(path=target, content=content), *edits)
+
 
 def mesh_uses(model: RobotModel) -> Iterator[MeshUse]:
     """Yield every mesh with a file of every link, collision meshes before visual ones."""
@@ -169,14 +200,6 @@ def used_meshes(
         )
         for uses in group((key(use.mesh), use) for use in mesh_uses(model)).values()
     ]
-
-
-def has_hull(meshes: Meshes, uses: Sequence[MeshUse]) -> bool:
-    """Return whether a mesh is readable and has a convex hull at the scale of every use."""
-    try:
-        return not any(meshes.is_flat(use.mesh) for use in uses)
-    except MeshError:
-        return False
 
 
 def is_missing(used: UsedMesh) -> bool:
@@ -220,37 +243,6 @@ def rename_edits(
             if value:
                 edits[source, attribute] = SetAttribute(source=source, name=attribute, value=value)
     return tuple(edits.values())
-
-
-def replace_edits(
-    model: RobotModel,
-    meshes: Meshes,
-    uses: Iterable[MeshUse],
-    name_suffix: str,
-    content: Callable[[], bytes],
-) -> tuple[Edit, ...] | None:
-    """Return the edits that write a new mesh beside the current one and refer to it instead.
-
-    Args:
-        model: The description.
-        meshes: All mesh files.
-        uses: Uses of one file.
-        name_suffix: End of the new name, which replaces the suffix of the file: `_hull.stl`.
-        content: Returns the content of the new file.
-
-    Returns:
-        The edits, or None if the uses are not editable.
-    """
-    uses = list(uses)
-    mesh = uses[0].mesh
-    target = _unused_path(meshes, mesh.path, name_suffix)
-    if model.kind == "mjcf":  # names are relative to meshdir, which does not change
-        folder = mesh.filename.replace("\\", "/").rpartition("/")
-        name = f"{folder[0]}{folder[1]}{target.name}"
-    else:
-        name = relative_name(model, target)
-    edits = rename_edits(model, uses, name)
-    return None if edits is None else (WriteFile(path=target, content=content), *edits)
 
 
 def _unused_path(meshes: Meshes, path: Path, name_suffix: str) -> Path:

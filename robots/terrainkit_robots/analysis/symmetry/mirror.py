@@ -1,6 +1,5 @@
 """Detect the mirror plane of a robot and the pairs of mirrored bodies."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.analysis.name_words import split_name
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
@@ -26,8 +26,6 @@ _MIN_ALIGNED_COSINE = 0.7
 _MIN_REACH = 0.25
 """Horizontal distance from the yaw axis to the foot over the length of the leg, at least, of a leg
 that reaches sideways. Feet below the hip have less than 0.1."""
-
-_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Za-z][a-z]*|\d+")
 
 _LEFT_TO_RIGHT = {
     "left": "right",
@@ -273,17 +271,16 @@ def _pairs_by_name(
 
 def _has_lone_letter(name: str) -> bool:
     """Return whether the only side in a name is the letter l or r."""
-    sides = [word.lower() for word in _TOKEN.findall(name) if word.lower() in _SIDES]
-    return sides in (["l"], ["r"])
+    return [word.lower() for word in side_words(name)] in (["l"], ["r"])
 
 
 def side_words(name: str) -> list[str]:
     """Return the words of a name that mark a side, such as FL or left, as they are written."""
-    return [word for word in _TOKEN.findall(name) if word.lower() in _SIDES]
+    return [word for word in split_name(name) if word.lower() in _SIDES]
 
 
 def _is_left(name: str) -> bool:
-    return any(word.lower() in _LEFT_TO_RIGHT for word in _TOKEN.findall(name))
+    return any(word.lower() in _LEFT_TO_RIGHT for word in split_name(name))
 
 
 def swap_sides(name: str) -> str:
@@ -292,8 +289,7 @@ def swap_sides(name: str) -> str:
     A name without a side is returned unchanged.
     """
 
-    def swap(match: re.Match[str]) -> str:
-        word = match.group()
+    def swap(word: str) -> str:
         other = _SIDES.get(word.lower())
         if other is None:
             return word
@@ -301,7 +297,7 @@ def swap_sides(name: str) -> str:
             return other.upper()
         return other.capitalize() if word[0].isupper() else other
 
-    return _TOKEN.sub(swap, name)
+    return "".join(map(swap, split_name(name)))
 
 
 def _pair_sign(mirror: Mirror, left: Body, right: Body) -> Sign:

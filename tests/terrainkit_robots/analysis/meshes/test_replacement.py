@@ -50,7 +50,7 @@ def test_faces_of_visual_meshes_are_counted_by_the_header(used, name, kind, expe
 def test_flat_mesh_has_no_hull(used):
     for scale, expected in (("1 1 1", True), ("1 0 1", False)):
         mesh = used(scale=scale)
-        assert uses.has_hull(mesh.meshes, mesh.uses) == expected
+        assert mesh.has_hull(mesh.uses) == expected
 
 
 def test_simplified_mesh_has_few_faces(used, monkeypatch):

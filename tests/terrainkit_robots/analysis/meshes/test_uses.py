@@ -11,7 +11,6 @@ from terrainkit_robots.analysis.meshes.uses import (
     mesh_uses,
     relative_name,
     rename_edits,
-    replace_edits,
 )
 from terrainkit_robots.description.fix import WriteFile
 from terrainkit_robots.description.load import load_robot
@@ -63,7 +62,7 @@ def test_mesh_files_skip_missing_files(robot):
 def replaced(robot, suffix="_hull.stl"):
     """Return the edits that replace the only mesh file."""
     (used,) = robot.mesh_files
-    return replace_edits(robot.model, robot.meshes, used.uses, suffix, lambda: b"hull")
+    return used.replace_edits(robot.model, used.uses, suffix, lambda: b"hull")
 
 
 def test_replace_edits_change_every_use(robot):

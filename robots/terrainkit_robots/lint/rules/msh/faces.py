@@ -3,13 +3,7 @@
 from collections.abc import Sequence
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.uses import (
-    MAX_COLLISION_FACES,
-    MAX_STL_FACES,
-    UsedMesh,
-    has_hull,
-    replace_edits,
-)
+from terrainkit_robots.analysis.meshes.uses import MAX_COLLISION_FACES, MAX_STL_FACES, UsedMesh
 from terrainkit_robots.description.fix import Edit, make_fix
 from terrainkit_robots.lint.rule import Part, Violation, Violations, rule
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
@@ -51,14 +45,14 @@ def _simplify_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     visuals = [use for use in used.uses if not use.is_collision]
     simplify = used.simplified_stl
     if robot.model.kind == "mjcf":  # all uses share one element
-        return replace_edits(robot.model, robot.meshes, used.uses, "_simplified.stl", simplify)
+        return used.replace_edits(robot.model, used.uses, "_simplified.stl", simplify)
     edits: list[Edit] = []
     for uses, ending, content in (
         (used.collisions, "_hull.stl", used.hull_stl),
         (visuals, "_simplified.stl", simplify),
     ):
-        made = replace_edits(robot.model, robot.meshes, uses, ending, content) if uses else ()
-        if made is None or (content is not simplify and not has_hull(robot.meshes, uses)):
+        made = used.replace_edits(robot.model, uses, ending, content) if uses else ()
+        if made is None or (content is not simplify and not used.has_hull(uses)):
             return None
         edits += made
     return edits
@@ -97,10 +91,6 @@ def dense_collision_mesh(robot: Facts) -> Violations:
 def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     visuals = {use.mesh.source for use in used.uses if not use.is_collision}
     is_shared = any(use.mesh.source in visuals for use in used.collisions)
-    if (
-        is_shared
-        or used.header.format == "ascii-stl"
-        or not has_hull(robot.meshes, used.collisions)
-    ):
+    if is_shared or used.header.format == "ascii-stl" or not used.has_hull(used.collisions):
         return None
-    return replace_edits(robot.model, robot.meshes, used.collisions, "_hull.stl", used.hull_stl)
+    return used.replace_edits(robot.model, used.collisions, "_hull.stl", used.hull_stl)

@@ -1,7 +1,7 @@
 """Rules on the formats of mesh files."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.uses import UsedMesh, has_hull, replace_edits
+from terrainkit_robots.analysis.meshes.uses import UsedMesh
 from terrainkit_robots.description.fix import make_fix
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.msh.path import not_loaded
@@ -32,8 +32,8 @@ def unsupported_format(robot: Facts) -> Violations:
             continue
         uses = used.uses if robot.model.kind == "mjcf" else used.collisions
         edits = None
-        if has_hull(robot.meshes, uses):
-            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", used.stl_or_hull)
+        if used.has_hull(uses):
+            edits = used.replace_edits(robot.model, uses, ".stl", used.stl_or_hull)
         yield Violation(
             element=used,
             message=f"format of {used.label}: got {suffix or 'no suffix'}; expected "
@@ -99,9 +99,7 @@ def ascii_stl(robot: Facts) -> Violations:
     """
     for used in robot.mesh_files:
         if used.header.format == "ascii-stl" and used.header.state == "fine":
-            edits = replace_edits(
-                robot.model, robot.meshes, used.uses, "_binary.stl", used.binary_copy
-            )
+            edits = used.replace_edits(robot.model, used.uses, "_binary.stl", used.binary_copy)
             yield Violation(
                 element=used,
                 message=f"format of {used.label}: got ASCII STL of {used.header.size:,} "
