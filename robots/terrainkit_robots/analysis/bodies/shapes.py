@@ -89,6 +89,12 @@ def bounds(shapes: Iterable[BodyShape], meshes: "Meshes") -> Matrix | None:
     return np.array([np.min(lowers, axis=0), np.max(uppers, axis=0)])
 
 
+def shape_key(geometry: Geometry) -> tuple[object, ...]:
+    """Return what two shapes have in common that are equal apart from their poses."""
+    mesh = geometry.mesh
+    return geometry.shape, geometry.size, mesh and (mesh.filename, mesh.scale)
+
+
 def min_height(shape: BodyShape, pose: Matrix, meshes: "Meshes") -> float:
     """Return the lowest z of a shape.
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.shapes import shape_key
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
-from terrainkit_robots.description.model import Geometry, Joint
+from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
 _MIN_PAIRS = 2
@@ -74,8 +75,4 @@ def _limits(joint: Joint) -> tuple[float | None, ...]:
 
 
 def _shapes(body: Body) -> list[object]:
-    def key(geometry: Geometry) -> object:
-        mesh = geometry.mesh
-        return geometry.shape, geometry.size, mesh and (mesh.filename, mesh.scale)
-
-    return [key(placed.geometry) for placed in (*body.collisions, *body.visuals)]
+    return [shape_key(placed.geometry) for placed in (*body.collisions, *body.visuals)]

@@ -7,7 +7,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.gaps import box_at_zero, shapes_of
-from terrainkit_robots.analysis.bodies.shapes import bounds
+from terrainkit_robots.analysis.bodies.shapes import bounds, shape_key
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import mass_part
 from terrainkit_robots.analysis.symmetry.mirror_pairs import (
@@ -158,8 +158,7 @@ def _moves_with_shape(robot: Facts, pair: MirrorPair, limit: float) -> bool:
         limit: Allowed difference of the two distances [m].
     """
     offsets = []
-    for side in (pair.left, pair.right):
-        body = side.body
+    for body in pair.bodies:
         box = bounds(body.collisions or body.visuals, robot.meshes)
         if box is None:
             return False
@@ -173,10 +172,6 @@ def _signature(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
     def key(pose: Matrix) -> tuple[float, ...]:
         return tuple(float(x) for x in np.round(pose[:3], 3).ravel() + 0.0)
 
-    shapes = [
-        (g.shape, g.size, (g.mesh.filename, g.mesh.scale) if g.mesh else None, key(placed.pose))
-        for placed in (*body.collisions, *body.visuals)
-        for g in (placed.geometry,)
-    ]
+    shapes = [(*shape_key(placed.geometry), key(placed.pose)) for placed in shapes_of(body)]
     mounts = [key(other.origin) for other in robot.bodies if other.parent == body.index]
     return Counter([*shapes, *mounts])
