@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.legs.closed_loops import largest_gap
-from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
+from terrainkit_robots.analysis.simulator_conventions.joint_order import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
@@ -308,7 +308,7 @@ def _loops(result: "OnboardResult", robot: "RobotFiles") -> Iterator[Statement]:
     facts = robot.facts
     if not facts.loops:
         return
-    gap = largest_gap(facts.loops, facts.bodies, facts.default_pose)
+    gap = largest_gap(facts, facts.default_pose)
     loops = count(len(facts.model.loops), "loop")
     text = f"{loops} closed within {1000 * gap:.2g} mm at the default pose"
     if gap > _MAX_GAP:

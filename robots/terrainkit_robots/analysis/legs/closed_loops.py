@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses
 from terrainkit_robots.description.model import Joint, Loop
 from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
 
 _MAX_GAP = 1e-5
 """Largest distance of the two points of a closed loop, along each axis [m]."""
@@ -56,8 +60,7 @@ def body_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> tuple[BodyLoop,
 
 
 def close_loops(
-    loops: Sequence[BodyLoop],
-    bodies: Sequence[Body],
+    robot: "Facts",
     positions: Mapping[str, float],
     *,
     legs: Collection[str],
@@ -69,15 +72,15 @@ def close_loops(
     move.
 
     Args:
-        loops: The loops.
-        bodies: The bodies, parents first.
+        robot: The robot.
         positions: Position of each moving joint [rad] or [m], by name.
         legs: Names of the joints of the legs.
         actuated: Names of the joints with an actuator.
     """
+    bodies = robot.bodies
     in_loops = {
         index
-        for loop in loops
+        for loop in robot.loops
         for index in set(ancestors(bodies, loop.bodies[0])) ^ set(ancestors(bodies, loop.bodies[1]))
     }
     joints = [
@@ -87,25 +90,20 @@ def close_loops(
     ]
     for held in (legs, actuated):
         moved = [joint for joint in joints if joint.name not in held]
-        solution = _solve(loops, bodies, positions, moved)
+        solution = _solve(robot, positions, moved)
         if solution:
             return {**positions, **solution}
     return dict(positions)
 
 
-def largest_gap(
-    loops: Sequence[BodyLoop], bodies: Sequence[Body], positions: Mapping[str, float]
-) -> float:
+def largest_gap(robot: "Facts", positions: Mapping[str, float]) -> float:
     """Return the largest distance between the two points of a loop [m]; see `close_loops`."""
-    gaps = _gaps(loops, body_poses(bodies, positions)).reshape(-1, 3)
+    gaps = _gaps(robot.loops, body_poses(robot.bodies, positions)).reshape(-1, 3)
     return float(np.linalg.norm(gaps, axis=1).max())
 
 
 def _solve(
-    loops: Sequence[BodyLoop],
-    bodies: Sequence[Body],
-    positions: Mapping[str, float],
-    joints: Sequence[Joint],
+    robot: "Facts", positions: Mapping[str, float], joints: Sequence[Joint]
 ) -> dict[str, float]:
     """Return the positions of some joints that close the loops, by Gauss-Newton; or none."""
     if not 0 < len(joints) <= _MAX_JOINTS:
@@ -118,7 +116,7 @@ def _solve(
         columns = (q + steps).T
         everything = {name: np.full(len(steps), value) for name, value in positions.items()}
         everything |= {joint.name: column for joint, column in zip(joints, columns, strict=True)}
-        gaps = _gaps(loops, body_poses(bodies, everything))
+        gaps = _gaps(robot.loops, body_poses(robot.bodies, everything))
         if np.abs(gaps[0]).max() <= _MAX_GAP:
             return {joint.name: float(x) for joint, x in zip(joints, q.round(5), strict=True)}
         jacobian = (gaps[1:] - gaps[0]).T / _DIFFERENCE

@@ -117,7 +117,7 @@ def solve_standing_pose(robot: "Facts") -> Mapping[str, float]:
         return positions
     legs = {joint.name for leg in robot.legs for joint in leg.joints}
     actuated = {joint.name for joint in robot.actuated}
-    return close_loops(robot.loops, robot.bodies, positions, legs=legs, actuated=actuated)
+    return close_loops(robot, positions, legs=legs, actuated=actuated)
 
 
 def round_position(joint: Joint, position: float) -> float:

@@ -30,7 +30,7 @@ CONNECTIONS = (
 def closed(connection, hip, reach=0.2):
     robot = mjcf(STRUT.format(reach=reach), f"<equality>{connection}</equality>")
     given = {"hip": hip, "swing": 0.0, "slide": 0.0}
-    return close_loops(robot.loops, robot.bodies, given, legs={"hip"}, actuated=()), given
+    return close_loops(robot, given, legs={"hip"}, actuated=()), given
 
 
 @pytest.mark.parametrize("connection", CONNECTIONS)

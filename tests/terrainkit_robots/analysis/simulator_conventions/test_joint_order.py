@@ -4,6 +4,7 @@ from itertools import pairwise
 import mujoco
 import pytest
 
+from terrainkit_robots.analysis.simulator_conventions.joint_order import order_table
 from terrainkit_robots.description import bundled
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from tests.small_robots import facts, floating, mjcf, tree_text
@@ -166,3 +167,14 @@ def test_mujoco_order_of_bundled_robot(name):
     model = path.with_suffix(".xml")
     with quiet_mujoco():
         check(facts(model.read_text()), mujoco.MjModel.from_xml_path(str(model)))
+
+
+def test_order_table_has_a_row_for_each_joint():
+    robot = facts(tree_text("jc: b > c", "ja: b > a", "jk: c > k"))
+    assert order_table(robot.file_order, robot.simulator_orders) == (
+        ("joint", "file", "MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"),
+        ("jc", "0", "0", "1", "1", "0", "0"),
+        ("ja", "1", "2", "0", "0", "2", "2"),
+        ("jk", "2", "1", "2", "2", "1", "1"),
+        ("", "", "certain", "to be verified", "to be verified", "certain", "certain"),
+    )
