@@ -69,11 +69,9 @@ def flat_foot_angle(body: Body, pose: Matrix, axis: Matrix, meshes: Meshes) -> f
         lengths.append(float(np.ptp(contact_points(body, rotated, meshes) @ forward)))
     flat = np.array(lengths) >= 0.98 * max(lengths)
     start = int(np.flatnonzero(flat)[np.abs(_ANGLES[flat]).argmin()])
-    first = last = start
-    while first > 0 and flat[first - 1]:
-        first -= 1
-    while last < len(flat) - 1 and flat[last + 1]:
-        last += 1
+    uneven = np.flatnonzero(~flat)
+    first = int(uneven[uneven < start].max(initial=-1)) + 1
+    last = int(uneven[uneven > start].min(initial=len(flat))) - 1
     # A ball is flat at all angles; for a foot take the middle of the flat interval.
     return 0.0 if last - first > len(flat) // 2 else float(_ANGLES[[first, last]].mean())
 

@@ -4,7 +4,7 @@ A file can refer to missing links, give a link two parents, or contain a cycle. 
 the joints that fit, and records the rejected joints with the reason.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -57,8 +57,11 @@ def build_tree(model: RobotModel, base: str | None = None) -> Tree:
     child_joints: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in parent_joint.values():
         child_joints[joint.parent].append(joint)
-    children = {name: [j.child for j in joints] for name, joints in child_joints.items()}
-    orders = {root: _depth_first(root, children) for root in links if root not in parent_joint}
+    orders = {
+        root: (root, *(joint.child for joint in depth_first(child_joints, root)))
+        for root in links
+        if root not in parent_joint
+    }
     # A root whose joint was rejected is not the root of the robot; among others the first wins.
     orphans = {joint.child for joint, _ in rejected}
     roots = sorted(orders, key=lambda root: (root != base, root in orphans, -len(orders[root])))
@@ -67,7 +70,7 @@ def build_tree(model: RobotModel, base: str | None = None) -> Tree:
         links=links,
         parent_joint=parent_joint,
         child_joints={name: tuple(joints) for name, joints in child_joints.items()},
-        order=tuple(orders[roots[0]]) if roots else (),
+        order=orders[roots[0]] if roots else (),
         rejected=tuple(rejected),
         cycles=tuple(cycles),
     )
@@ -111,10 +114,10 @@ def _detect_cycles(parent_joint: Mapping[str, Joint]) -> list[tuple[str, ...]]:
     return cycles
 
 
-def _depth_first(root: str, children: Mapping[str, list[str]]) -> list[str]:
-    order, stack = [], [root]
+def depth_first(child_joints: Mapping[str, Sequence[Joint]], base: str) -> Iterator[Joint]:
+    """Yield the joints below a link depth first, siblings in their order."""
+    stack = list(reversed(child_joints[base]))
     while stack:
-        link = stack.pop()
-        order.append(link)
-        stack.extend(reversed(children[link]))
-    return order
+        joint = stack.pop()
+        yield joint
+        stack.extend(reversed(child_joints[joint.child]))

@@ -28,6 +28,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from terrainkit_robots.analysis.bodies.tree import depth_first
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     SIMULATORS,
     MergedTree,
@@ -123,7 +124,7 @@ def _default_order(robot: "Facts", simulator: Simulator) -> tuple[_Names, _Names
     elif simulator not in ("MuJoCo", "PyBullet") and _is_urdf(robot):
         key = _joint_name
     tree = merged_tree(robot, simulator)
-    traverse = _breadth_first if simulator == "Isaac Lab" else _depth_first
+    traverse = _breadth_first if simulator == "Isaac Lab" else depth_first
     joints = list(traverse(_sort_siblings(tree, key), tree.base))
     virtual = {link.name for body in robot.bodies for link in body.links if link.virtual}
     body_names = [tree.base, *(joint.child for joint in joints)]
@@ -154,7 +155,7 @@ def _certainty(robot: "Facts", simulator: Simulator) -> tuple[bool, str]:
             keys = [_joint_name]
             known, names = "in importers up to Isaac Sim 5.1", "robot.joint_names"
         case "Isaac Gym":
-            traverse = _depth_first
+            traverse = depth_first
             first = "depth first"
             keys = [_joint_name, _link_name]
             known = "in the lists published for A1 and Go1"
@@ -212,14 +213,6 @@ def _sort_siblings(tree: MergedTree, key: _Key | None) -> _ChildJoints:
         body: tuple(sorted(joints, key=key))  # type: ignore[arg-type]
         for body, joints in tree.child_joints.items()
     }
-
-
-def _depth_first(child_joints: _ChildJoints, base: str) -> Iterator[Joint]:
-    stack = list(reversed(child_joints[base]))
-    while stack:
-        joint = stack.pop()
-        yield joint
-        stack.extend(reversed(child_joints[joint.child]))
 
 
 def _breadth_first(child_joints: _ChildJoints, base: str) -> Iterator[Joint]:

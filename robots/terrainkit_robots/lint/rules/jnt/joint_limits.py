@@ -35,9 +35,8 @@ def continuous_leg_joint(robot: Facts) -> Violations:
     """
     if robot.model.kind == "mjcf":
         return  # checked by JNT017
-    bodies = robot.body_of_joint
     for joint in robot.leg_joints:
-        if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
+        if joint.kind == "continuous" and not robot.is_wheel(robot.body_of_joint[joint.name]):
             yield Violation(
                 element=joint,
                 message=f"type of leg joint {joint.name}: got continuous; expected revolute with "
@@ -210,10 +209,9 @@ def unlimited_joint(robot: Facts) -> Violations:
     """
     if robot.model.kind != "mjcf":
         return
-    bodies = robot.body_of_joint
     for joint in robot.robot_joints:
         free = joint.kind == "continuous" and not joint.coupled
-        if free and not robot.is_wheel(bodies[joint.name]):
+        if free and not robot.is_wheel(robot.body_of_joint[joint.name]):
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",
