@@ -43,13 +43,11 @@ def body_difference(
     with np.errstate(all="ignore"):
         for a, b in (own_frames, base_frames):
             centers.append(np.linalg.norm(_center(body, a) - _center(other_body, b)))
-            inertia, other_inertia = _inertia(body, a), _inertia(other_body, b)
-            largest = max(np.abs(inertia).max(), np.abs(other_inertia).max())
-            inertias.append(np.abs(inertia - other_inertia).max() / largest if largest > 0 else 0.0)
+            inertias.append(relative_difference(_inertia(body, a), _inertia(other_body, b)))
     return BodyDifference(
         mass=relative_difference(body.mass, other_body.mass),
         center=float(min(centers)),
-        inertia=float(min(inertias)),
+        inertia=min(inertias),
     )
 
 
@@ -68,10 +66,13 @@ def has_valid_inertial(body: Body) -> bool:
     )
 
 
-def relative_difference(a: float, b: float) -> float:
-    """Return the difference of two numbers relative to the larger one, or 0 for two zeros."""
-    largest = max(abs(a), abs(b))
-    return abs(a - b) / largest if largest != 0 else 0.0
+def relative_difference(a: float | Matrix, b: float | Matrix) -> float:
+    """Return the difference of two numbers relative to the larger one, or 0 for two zeros.
+
+    Of two arrays, this is the largest difference relative to the largest number.
+    """
+    largest = float(max(np.abs(a).max(), np.abs(b).max()))
+    return float(np.abs(a - b).max()) / largest if largest != 0 else 0.0
 
 
 def _center(body: Body, frame: Matrix) -> Matrix:

@@ -55,7 +55,7 @@ def inertia_asymmetry(robot: Facts) -> Violations:
             continue
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
-        difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
+        difference = min(relative_difference(a, b), relative_difference(a, scaled))
         harmless = difference <= _MAX_MOMENT_DIFFERENCE or pair.is_negligible(robot.total_mass)
         if harmless or other_rules.report(pair):
             continue
@@ -81,11 +81,6 @@ def _has_same_parts(robot: Facts, pair: MirrorPair) -> bool:
     difference = relative_difference(pair.left.body.mass, pair.right.body.mass)
     close = pair.com_error(robot.mirror) <= pair.max_com_error
     return close and difference <= MAX_MASS_DIFFERENCE
-
-
-def _moment_difference(a: Matrix, b: Matrix) -> float:
-    largest = max(float(np.abs(a).max()), float(np.abs(b).max()))
-    return float(np.abs(a - b).max()) / largest if largest > 0 else 0.0
 
 
 def _precision(body: Body) -> float:
