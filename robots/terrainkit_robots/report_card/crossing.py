@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from terrainkit import TerrainMap
@@ -90,6 +91,8 @@ class Crossing:
         env.curriculum.levels[:], env.curriculum.columns[:] = levels, columns
         env.set_commands(None)
         env.reset()
+        if reset := getattr(self._policy, "reset", None):  # a network with the last attempt's state
+            reset(torch.ones(env.num_envs, dtype=torch.bool))
         patches = [self._map.patch(*place) for place in zip(levels, columns, strict=True)]
         progress = _Progress(env, patches, self.speed)
         for _, fell in rollout(env, self._policy, progress.schedule()):

@@ -124,3 +124,26 @@ def test_a_bar_stops_a_robot_of_which_only_the_feet_collide(tmp_path):
         attempts = crossing.attempt(np.zeros(3, np.int64), np.zeros(3, np.int64))
         crossed.append((attempts.outcomes == CROSSED).tolist())
     assert crossed == [[False] * 3, [True] * 3]
+
+
+def test_every_attempt_starts_with_the_initial_state_of_a_recurrent_policy():
+    class Statue:
+        steps = 0
+        seen = ()
+
+        def __call__(self, obs):
+            self.seen = (*self.seen, self.steps)
+            self.steps += 1
+            return np.zeros((len(obs), 12))
+
+        def reset(self, dones):
+            self.steps *= not dones.all()
+
+    policy = Statue()
+    terrains = (SubTerrain(terrain="flat"),)
+    config = MapConfig(rows=1, cols=1, patch_size=(4.0, 2.0), border=1.0, terrains=terrains)
+    spec = replace(open_run("quadruped"), policy=policy)
+    crossing = Crossing(spec, generate(config), 1, EvaluationConfig())
+    for _ in range(2):
+        crossing.attempt(np.zeros(1, np.int64), np.zeros(1, np.int64))
+    assert policy.seen.count(0) == 2
