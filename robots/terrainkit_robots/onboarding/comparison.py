@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import compress
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from terrainkit_robots.analysis.legs.stance import GRAVITY
@@ -141,8 +142,6 @@ def compare_models(
         ignored: What is not compared: `forces` of springs, actuators and constraints with their
             settings, gains of `actuators`, or `shapes`.
     """
-    import mujoco
-
     source_names, written_names = joint_names_of(source), joint_names_of(written)
     joint_names = [name for name in written_names if name in set(source_names)]
     frames = {written.body(k).name for k in range(written.nbody)}
@@ -199,8 +198,6 @@ def _largest_errors(source: Side, written: Side, ignored: Collection[str]) -> di
 
 def _isolate(side: Side, time_step: float) -> None:
     """Turn off contacts, limits and friction, and use the time step of the written model."""
-    import mujoco
-
     options = side.model.opt
     flags = ("CONTACT", "LIMIT", "FRICTIONLOSS", "CLAMPCTRL")
     off = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}")) for flag in flags)
@@ -213,8 +210,6 @@ def _isolate(side: Side, time_step: float) -> None:
 
 def joint_names_of(model: Any) -> list[str]:
     """Return the names of the hinges and slides of a model that have one."""
-    import mujoco
-
     moving = np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE))
     return [name for k in moving if (name := model.joint(k).name)]
 
@@ -230,8 +225,6 @@ def make_side(
         base: Name of the base; a model without this body has the world as its base.
         links: Names of bodies or sites of the model.
     """
-    import mujoco
-
     model = copy.copy(original)
     joints = tuple(int(model.joint(name).id) for name in joint_names)
     (free,) = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
@@ -302,8 +295,6 @@ def _effort_limits(side: Side) -> Matrix:
 
 def _states(source: Side, written: Side, *, has_targets: bool) -> Iterator[dict[str, Matrix]]:
     """Yield the errors of each quantity at random states, by link or by joint."""
-    import mujoco
-
     rng = np.random.default_rng(0)
     model = source.model
     low, high = np.clip(_ranges(source), -_MAX_POSITION, _MAX_POSITION).T
@@ -362,8 +353,6 @@ def _link_poses(side: Side) -> Matrix:
 
 def _close(side: Side) -> None:
     """Move the joints so that the equality constraints hold, as far as possible."""
-    import mujoco
-
     model, data = side.model, side.data
     for _ in range(_NUM_ITERATIONS if model.neq else 0):
         mujoco.mj_fwdPosition(model, data)
@@ -379,8 +368,6 @@ def _close(side: Side) -> None:
 
 def _quantities(side: Side, shared: list[int], both_free: bool) -> dict[str, Matrix]:
     """Return what is compared, in the order of the joints, then of the base."""
-    import mujoco
-
     model, data, dofs = side.model, side.data, side.dofs
     if both_free:
         first = int(model.jnt_dofadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE][0])

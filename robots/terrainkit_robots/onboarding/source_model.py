@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from terrainkit.errors import ExportError, one_line
@@ -28,8 +29,6 @@ def load_source(facts: Facts) -> Any:
     Raises:
         CannotCheckError: If MuJoCo does not load it.
     """
-    import mujoco
-
     file = facts.model.file
     meshes = facts.meshes
     try:
@@ -51,8 +50,6 @@ def load_source(facts: Facts) -> Any:
 
 def _replace_balls(spec: Any) -> None:
     """Replace the ball joints below the base by hinges about x, y and z, as the written files."""
-    import mujoco
-
     balls = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_BALL]
     for ball in balls:
         body = ball.parent
@@ -83,8 +80,6 @@ def described_model(facts: Facts, written: Facts) -> Any:
     Raises:
         ExportError: If MuJoCo rejects it.
     """
-    import mujoco
-
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     joint_names = {joint.child: joint.name for joint in written.joints}
@@ -140,8 +135,6 @@ def _add_equalities(spec: Any, facts: Facts, bodies: Mapping[str, Any]) -> None:
         facts: The robot.
         bodies: The MuJoCo body of each link.
     """
-    import mujoco
-
     for joint in mimic_joints(facts.joints):
         assert joint.mimic is not None
         spec.add_equality(

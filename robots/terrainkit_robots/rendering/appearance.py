@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,8 +15,6 @@ VISIBLE_GROUPS = (0, 1, 2)  # geom groups that MuJoCo shows by default
 
 def set_appearance(spec: Any) -> None:
     """Set the lights, the sky and the visual options of a `mujoco.MjSpec`."""
-    import mujoco
-
     sky, visual = mujoco.mjtTexture.mjTEXTURE_SKYBOX, spec.visual
     for element in (*spec.lights, *(texture for texture in spec.textures if texture.type == sky)):
         spec.delete(element)
@@ -37,8 +36,6 @@ def set_appearance(spec: Any) -> None:
 
 def make_renderer(model: Any, size: tuple[int, int], extent: float) -> Any:
     """Return a `mujoco.Renderer`; the model's extent [m] scales the fog and the shadows."""
-    import mujoco
-
     model.stat.extent = extent
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     renderer = mujoco.Renderer(model, size[1], size[0], max_geom=30 * model.ngeom + 1000)
@@ -63,8 +60,6 @@ def update_scene(
     Returns:
         The `mujoco.MjvOption`.
     """
-    import mujoco
-
     camera = mujoco.MjvCamera()
     options = mujoco.MjvOption()
     scene = renderer.scene

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +49,6 @@ def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8
         RenderError: if MuJoCo cannot load the robot.
     """
     import cv2
-    import mujoco
 
     try:
         model = _load_model(file)
@@ -80,8 +80,6 @@ def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8
 
 def _load_model(file: Path) -> Any:
     """Return the model of a robot with a floor, whose height and grid spacing are set later."""
-    import mujoco
-
     spec = mujoco.MjSpec.from_file(str(file))
     appearance.set_appearance(spec)
     texture = spec.add_texture(name=FLOOR, type=mujoco.mjtTexture.mjTEXTURE_2D)
@@ -102,8 +100,6 @@ def show_robot_geoms(model: Any) -> NDArray[np.int64]:
     by its collision geoms, and a transparent robot by all of its geoms. Planes and heightfields
     are not part of a robot.
     """
-    import mujoco
-
     rgba, solid = model.geom_rgba, model.geom_type > int(mujoco.mjtGeom.mjGEOM_HFIELD)
     is_uncolored = (rgba == MUJOCO_RGBA).all(axis=1)  # the material shows, if there is one
     has_material = is_uncolored & (model.geom_matid >= 0)

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -126,8 +127,6 @@ def video_frames(spec: VideoSpec) -> Iterator[Frame]:
 
 def prepare_model(model: Any) -> float:
     """Adjust what a model shows, and return the distance of a camera from its robot [m]."""
-    import mujoco
-
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     is_robot = model.body_weldid[model.geom_bodyid] != 0
@@ -160,8 +159,6 @@ def visible_area(
 
 
 def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame]:
-    import mujoco
-
     poses = spec.poses[: len(shot.captions)]
     targets = smooth_path(poses[:, shot.robot, :3], 0.4 * spec.fps)
     model = cut_heightfields(spec.model, *visible_area(targets, distance, spec.size))
@@ -208,8 +205,6 @@ def cut_heightfields(model: Any, lower: FloatArray, upper: FloatArray) -> Any:
 
     Without a GPU, most of the time would be spent on the triangles of a large heightfield.
     """
-    import mujoco
-
     model, data = copy.copy(model), mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     model.geom_sameframe[:] = 0  # otherwise MuJoCo ignores changes of geom_pos

@@ -2,20 +2,18 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mujoco
 import numpy as np
 
 from terrainkit_robots.description.mjcf.compiled_bodies import JointScale
 from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import Actuator, PositionGains
 
-if TYPE_CHECKING:
-    import mujoco
-
 
 def read_actuators(
-    spec: "mujoco.MjSpec", node_of: Callable[[Any], Node], scales: Mapping[str, JointScale]
+    spec: mujoco.MjSpec, node_of: Callable[[Any], Node], scales: Mapping[str, JointScale]
 ) -> Iterator[Actuator]:
     """Yield the actuators of a model.
 
@@ -24,8 +22,6 @@ def read_actuators(
         node_of: Function that returns the node of a MuJoCo element.
         scales: Factors of the frames around each joint, by name.
     """
-    import mujoco
-
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     for actuator in spec.actuators:
         node = node_of(actuator)
@@ -61,8 +57,6 @@ def _commanded_force(actuator: Any, command: float | None) -> float | None:
 
     The force of a servo also depends on the joint position, so that no command limits it.
     """
-    import mujoco
-
     direct = actuator.dyntype in (
         mujoco.mjtDyn.mjDYN_NONE,
         mujoco.mjtDyn.mjDYN_FILTER,
@@ -78,8 +72,6 @@ def _commanded_force(actuator: Any, command: float | None) -> float | None:
 
 def _stiffness(actuator: Any, gear: float) -> float | None:
     """Return the position gain on the joint; None if the actuator does not control a position."""
-    import mujoco
-
     fixed = actuator.gaintype == mujoco.mjtGain.mjGAIN_FIXED
     affine = actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE
     gain = float(actuator.gainprm[0])
@@ -89,8 +81,6 @@ def _stiffness(actuator: Any, gear: float) -> float | None:
 
 def _max_magnitude(limited: Any, bounds: Sequence[float], autolimits: bool) -> float | None:
     """Return the largest absolute value of a range; None if the range is not active."""
-    import mujoco
-
     low, high = map(float, bounds)
     states = mujoco.mjtLimited
     holds = limited == states.mjLIMITED_TRUE or (

@@ -18,8 +18,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mujoco
 import numpy as np
 
 from terrainkit_robots.description.mjcf.mesh_masses import MeshMasses
@@ -28,9 +29,6 @@ from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import ShapeKind
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import Matrix, quat_to_matrix
-
-if TYPE_CHECKING:
-    import mujoco
 
 _SPANNING: frozenset[ShapeKind] = frozenset({"capsule", "cylinder", "ellipsoid", "box"})
 """Shapes that `fromto` applies to."""
@@ -63,13 +61,11 @@ class CompiledBodies:
 
     def __init__(
         self,
-        spec: "mujoco.MjSpec",
+        spec: mujoco.MjSpec,
         node_of: Callable[[Any], Node],
         report: Callable[[Node, str], None],
         contents: Mapping[Path, bytes],
     ) -> None:
-        import mujoco
-
         self._parsed, self._node_of, self._report = spec, node_of, report
         self._spec = mujoco.MjSpec()
         self._meshes = MeshMasses(spec, self._spec, node_of, contents)
@@ -175,8 +171,6 @@ class CompiledBodies:
 
     def _copy_shape(self, shape: Any) -> None:
         """Add a geom or site to the copy, without mass."""
-        import mujoco
-
         kind = shape_kind(shape)
         ends = shape.fromto
         spans = kind in _SPANNING and not math.isnan(ends[0])
@@ -202,8 +196,6 @@ class CompiledBodies:
 
     def _set_mass(self, geom: Any, body: Any) -> None:
         """Give the copy of a geom the mass of the geom, as far as MuJoCo can compile it."""
-        import mujoco
-
         copy = self._copies[geom]
         mass = float(geom.mass)
         density = float(geom.density)
@@ -226,8 +218,6 @@ class CompiledBodies:
 
     def _copy_joint(self, joint: Any) -> None:
         """Add the anchor of a joint to the copy, with a unit joint if its values may be scaled."""
-        import mujoco
-
         kinds, limited = mujoco.mjtJoint, mujoco.mjtLimited.mjLIMITED_TRUE
         anchor = self._place(joint).add_body(pos=joint.pos)
         self._copies[joint] = anchor
@@ -271,8 +261,6 @@ class CompiledBodies:
 
     def _quat(self, element: Any, quat: Matrix, alt: Any, child: str = "") -> Matrix:
         """Return the quaternion of an orientation; the identity if it is invalid."""
-        import mujoco
-
         if alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
             return quat
         compiler = element.compiler
@@ -299,8 +287,6 @@ def _is_scaled(frame: Any) -> bool:
 
 def is_explicit(body: Any) -> bool:
     """Return whether MuJoCo uses the <inertial> of a body."""
-    import mujoco
-
     derived = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     return bool(body.explicitinertial and body.compiler.inertiafromgeom != derived)
 

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+import mujoco
 import numpy as np
 from numpy.polynomial import Polynomial
 
@@ -12,9 +13,6 @@ from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import WORLD, Coupling, Loop, Mimic, Tendon
 from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.transforms import Matrix, invert_poses, quat_to_matrix
-
-if TYPE_CHECKING:
-    import mujoco
 
 _SOLVER = ("solref", "solimp")
 
@@ -63,13 +61,11 @@ class Constraints:
 
     def __init__(
         self,
-        spec: "mujoco.MjSpec",
+        spec: mujoco.MjSpec,
         node_of: Callable[[Any], Node],
         link_names: Mapping[Any, str],
         compiled: CompiledBodies,
     ) -> None:
-        import mujoco
-
         self.mimics: dict[str, Mimic] = {}
         """The mimic of each joint that a linear equality couples to another joint."""
 
@@ -143,8 +139,6 @@ class Constraints:
         return [find(name) if name else None for name in (equality.name1, equality.name2)]
 
     def _read_loop(self, equality: Any, name: str) -> None:
-        import mujoco
-
         is_weld = equality.type == mujoco.mjtEq.mjEQ_WELD
         settings = self._settings(equality)
         if is_weld and equality.data[10] != 1:
@@ -175,8 +169,6 @@ class Constraints:
 
     def _body_ends(self, equality: Any) -> list[tuple[Any, Matrix]]:
         """Return both bodies of a constraint, and the pose of its frame in each."""
-        import mujoco
-
         bodies = self._ends(equality, self._spec.body)
         if None in bodies:
             return []
@@ -193,8 +185,6 @@ class Constraints:
         return [(bodies[0], first), (bodies[1], frame)]
 
     def _read_tendon(self, tendon: Any, name: str) -> None:
-        import mujoco
-
         kinds = mujoco.mjtWrap
         joints: dict[str, float] = {}
         points: list[tuple[str, Matrix] | float] = []
@@ -220,8 +210,6 @@ class Constraints:
 
 def _reference(joint: Any) -> float:
     """Return the reference of a joint [rad] or [m]."""
-    import mujoco
-
     hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
     return float(joint.ref) * (math.pi / 180 if hinge and joint.compiler.degree else 1.0)
 

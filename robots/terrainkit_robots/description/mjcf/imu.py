@@ -1,20 +1,17 @@
 """Find the site of the IMU of an MJCF."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import mujoco
 
 from terrainkit_robots.description.mjcf.constraints import ancestors
 
-if TYPE_CHECKING:
-    import mujoco
 
-
-def find_imu(spec: "mujoco.MjSpec") -> Any:
+def find_imu(spec: mujoco.MjSpec) -> Any:
     """Return the site of a gyro or an accelerometer, else a site named imu, else None.
 
     Of several sites, the site closest to the base is returned.
     """
-    import mujoco
-
     kinds = (mujoco.mjtSensor.mjSENS_GYRO, mujoco.mjtSensor.mjSENS_ACCELEROMETER)
     sensed = {sensor.objname for sensor in spec.sensors if sensor.type in kinds} - {""}
     sites = [site for site in spec.sites if site.parent != spec.worldbody]

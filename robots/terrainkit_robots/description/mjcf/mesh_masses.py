@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
 from terrainkit_robots.description.mjcf.shapes import mesh_file, mesh_name
 from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.files import open_regular
@@ -52,8 +54,6 @@ class MeshMasses:
 
     def _add_mesh(self, geom: Any) -> bool:
         """Add the mesh of a geom to the copy, unless MuJoCo rejects it."""
-        import mujoco
-
         name = geom.meshname
         mesh = self._meshes.get(name)
         data = None if mesh is None else self._data(mesh)

@@ -10,7 +10,8 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING
+
+import mujoco
 
 from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.description.fix import number_fix
@@ -18,9 +19,6 @@ from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, 
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.text import UniqueNames
-
-if TYPE_CHECKING:
-    import mujoco
 
 MAX_ATTEMPTS = 50
 """Maximum number of parser runs; a file with more kinds of errors is not MJCF."""
@@ -59,7 +57,7 @@ _DEFAULTS = {"mass": "nan", "pos": "0 0 0"}
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "fullinertia")
 
 
-def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
+def parse_mjcf(tree: MjcfTree) -> tuple[mujoco.MjSpec | None, list[Node]]:
     """Parse a tree with MuJoCo.
 
     Rejected elements are removed from the tree and reported as problems.
@@ -68,8 +66,6 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
         The spec and the node of each line. The spec is None if MuJoCo still rejects the tree
         after many repairs.
     """
-    import mujoco
-
     for node in list(tree.nodes()):
         _check_numbers(tree, node)
     start = time.monotonic()
@@ -225,8 +221,6 @@ def _report_unknown(
     tree: MjcfTree, nodes: Sequence[Node], what: str, attribute: str, known: Collection[str]
 ) -> str:
     """Report an unknown attribute or element; return a similar known name, or an empty string."""
-    import mujoco
-
     suggestion = closest(attribute or nodes[0].tag, known, _MIN_SIMILARITY)
     meant = suggestion if attribute else f"<{suggestion}>"
     tree.add_problem(
@@ -395,8 +389,6 @@ class _Schema:
 @cache
 def _schema() -> _Schema:
     """Return MuJoCo's schema."""
-    import mujoco
-
     schema = _Schema(attributes=defaultdict(set), children=defaultdict(set))
     path: list[str] = []
     for line in mujoco.mj_printSchema(False, False).splitlines():

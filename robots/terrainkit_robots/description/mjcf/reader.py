@@ -10,8 +10,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mujoco
 import numpy as np
 
 from terrainkit_robots.description.mjcf.actuators import (
@@ -60,9 +61,6 @@ from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers
 from terrainkit_robots.text import UniqueNames, count, names
 
-if TYPE_CHECKING:
-    import mujoco
-
 
 def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
     """Return the robot of a document whose root is <mujoco>.
@@ -92,12 +90,10 @@ class _SpecReader:
     def __init__(
         self,
         mjcf: MjcfTree,
-        spec: "mujoco.MjSpec",
+        spec: mujoco.MjSpec,
         lines: Sequence[Node],
         contents: Mapping[Path, bytes],
     ) -> None:
-        import mujoco
-
         self._mjcf, self._contents = mjcf, contents
         self._spec = spec
         self._lines = lines
@@ -117,8 +113,6 @@ class _SpecReader:
 
     def fill(self, model: RobotModel) -> RobotModel:
         """Return the model with the contents of the spec; without links if MuJoCo rejects it."""
-        import mujoco
-
         imu = find_imu(self._spec)
         try:
             self._compiled = CompiledBodies(self._spec, self._node, self._report, self._contents)
@@ -178,8 +172,6 @@ class _SpecReader:
                 self._mjcf.add_problem(node, "XML018", message)
 
     def _options(self) -> PhysicsOptions:
-        import mujoco
-
         option = self._spec.option
         nodes = [node for node in self._mjcf.nodes() if node.tag == "option"]
         names = ("contact", "constraint", "limit", "actuation", "gravity", "equality")
@@ -248,8 +240,6 @@ class _SpecReader:
         )
 
     def _inertial(self, body: Any, node: Node) -> Inertial | None:
-        import mujoco
-
         compiled = self._compiled.inertial(body)
         if not is_explicit(body):
             if body.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE:
@@ -302,8 +292,6 @@ class _SpecReader:
 
     def _bits(self, geom: Any) -> tuple[int, int]:
         """Return contype and conaffinity."""
-        import mujoco
-
         if self._spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
             return 0, 0
         if geom.name in self._paired and not (geom.contype or geom.conaffinity):
@@ -340,8 +328,6 @@ class _SpecReader:
 
     def _joint(self, joint: Any, node: Node, name: str) -> Joint:
         """Return a joint without its parent and child."""
-        import mujoco
-
         kinds = mujoco.mjtJoint
         frame, scale = self._compiled.body_pose(joint), self._compiled.joint_scale(joint)
         bare = Joint(
@@ -381,8 +367,6 @@ class _SpecReader:
 
     def _range(self, joint: Any, node: Node) -> tuple[float, float] | None:
         """Return the limits as written, or None; MuJoCo ignores limits that are not in order."""
-        import mujoco
-
         low, high = map(float, joint.range)
         limited = mujoco.mjtLimited
         if joint.limited == limited.mjLIMITED_FALSE:

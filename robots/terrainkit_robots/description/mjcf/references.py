@@ -2,13 +2,11 @@
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+import mujoco
 
 from terrainkit_robots.description.mjcf.shapes import mesh_name
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node
-
-if TYPE_CHECKING:
-    import mujoco
 
 _REFERENCE = re.compile(
     r"(?:side|crank|slider|ref)?(joint|body|geom|site|tendon|mesh|material)(?:inparent|[12])?"
@@ -18,7 +16,7 @@ _REFERENCE = re.compile(
 _SECTIONS = frozenset({"worldbody", "contact", "tendon", "equality", "actuator", "sensor"})
 
 
-def dangling_references(tree: MjcfTree, spec: "mujoco.MjSpec") -> None:
+def dangling_references(tree: MjcfTree, spec: mujoco.MjSpec) -> None:
     """Add a problem for each reference to a name that does not exist.
 
     Nothing is reported where the element may be elsewhere: in incomplete documents, in documents

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
+import mujoco
 import numpy as np
 
 from terrainkit_robots.description.mjcf.tree import Node
@@ -27,8 +28,6 @@ _KINDS: Mapping[str, ShapeKind] = {f"mjGEOM_{kind.upper()}": kind for kind in ge
 
 def shape_kind(shape: Any) -> ShapeKind:
     """Return the kind of a geom or site."""
-    import mujoco
-
     return _KINDS.get(mujoco.mjtGeom(shape.type).name, "unknown")
 
 
