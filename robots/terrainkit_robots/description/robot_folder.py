@@ -4,13 +4,11 @@ import os
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from lxml import etree
 
 from terrainkit_robots.description.package_resolver import PackageResolver
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 MAX_FILES = 100_000
 """Maximum number of files in a folder that may be robots, by their suffix."""
@@ -77,7 +75,7 @@ def _may_be_robot(path: Path) -> bool:
     return path.suffix.lower() in _SUFFIXES and not is_srdf and path.is_file()
 
 
-def _read_root(path: Path) -> "etree._Element | None":
+def _read_root(path: Path) -> etree._Element | None:
     """Return the root element of a file; None if it cannot be read."""
     try:
         return parse_xml(path, read_bytes(path)).root
@@ -85,11 +83,11 @@ def _read_root(path: Path) -> "etree._Element | None":
         return None
 
 
-def _is_mjcf(root: "etree._Element | None") -> bool:
+def _is_mjcf(root: etree._Element | None) -> bool:
     return root is not None and root.tag == "mujoco"
 
 
-def _is_robot(path: Path, root: "etree._Element | None") -> bool:
+def _is_robot(path: Path, root: etree._Element | None) -> bool:
     """Return whether a file describes a robot, or is one by its suffix and is damaged."""
     tags = () if root is None else [str(child.tag) for child in root.iterchildren("*")]
     children = {tag.rpartition("}")[2] for tag in tags}
@@ -101,7 +99,7 @@ def _is_robot(path: Path, root: "etree._Element | None") -> bool:
     return not children <= _FRAGMENTS | ({"include"} if "macro" in children else set())
 
 
-def _included_files(path: Path, root: "etree._Element | None") -> set[str]:
+def _included_files(path: Path, root: etree._Element | None) -> set[str]:
     """Return the real paths of the files that a file includes."""
     elements = () if root is None else root.iter("{*}include")
     names = [element.get("filename") or element.get("file") or "" for element in elements]

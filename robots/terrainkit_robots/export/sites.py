@@ -1,7 +1,6 @@
 """Create the sites of the feet and the IMU."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,19 +8,17 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.contact import MAX_SOLE_DEPTH
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds, min_height
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.export.mjcf import Site
 from terrainkit_robots.transforms import Matrix, invert_poses
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.analysis.legs.legs import Leg
 
 _MARGIN = 0.002
 """Margin by which a foot site exceeds its geometry on each side, so that it contains contacts [m].
 """
 
 
-def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
+def foot_sites(facts: Facts, feet: Sequence[str] = ()) -> tuple[Site, ...]:
     """Return a site for each leg that encloses the geometry in contact with the ground.
 
     Args:
@@ -36,7 +33,7 @@ def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
     )
 
 
-def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -> Site:
+def _foot_site(leg: Leg, foot: str, facts: Facts, poses: Sequence[Matrix]) -> Site:
     body = facts.bodies[leg.limb.chain[-1]]
     local = pose_in_body(body, foot)
     box = bounds(_ground_contacts(body, poses[body.index], facts), facts.meshes)
@@ -50,7 +47,7 @@ def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -
     return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))
 
 
-def _ground_contacts(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape]:
+def _ground_contacts(body: Body, pose: Matrix, facts: Facts) -> list[BodyShape]:
     """Return the lowest collision geometry of a body."""
     shapes = [s for s in body.collisions if has_bounds(s.geometry, facts.meshes)]
     depths = [min_height(shape, pose, facts.meshes) for shape in shapes]
@@ -59,7 +56,7 @@ def _ground_contacts(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape
     ]
 
 
-def imu_site(facts: "Facts") -> Site:
+def imu_site(facts: Facts) -> Site:
     """Return the site of the IMU: as defined in the file, or at a link of the base named imu.
 
     Otherwise it is at the origin of the base, and `imu_changes` says so.
@@ -68,7 +65,7 @@ def imu_site(facts: "Facts") -> Site:
     return Site(name="imu", body=body.top.name, pose=pose)
 
 
-def imu_changes(facts: "Facts") -> tuple[str, ...]:
+def imu_changes(facts: Facts) -> tuple[str, ...]:
     """Return the change if a robot with a free base does not define its IMU."""
     if _imu(facts) is not None or facts.model.floating is False:
         return ()
@@ -76,7 +73,7 @@ def imu_changes(facts: "Facts") -> tuple[str, ...]:
     return (f"placed the IMU at the origin of {base}: no sensor, site or link defines it",)
 
 
-def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
+def _imu(facts: Facts) -> tuple[Body, Matrix] | None:
     """Return the body of the IMU and the pose in its frame; None if it is not defined."""
     imu = facts.model.imu
     if imu is not None and imu[0] in facts.body_of:
@@ -89,7 +86,7 @@ def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
     return None
 
 
-def _base(facts: "Facts") -> Body:
+def _base(facts: Facts) -> Body:
     return next((body for body in facts.bodies if not body.virtual), facts.bodies[0])
 
 

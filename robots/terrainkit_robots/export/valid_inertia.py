@@ -6,10 +6,10 @@ g without inertia on a trunk of 60 kg, and a plate with a rounded last digit.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia
 from terrainkit_robots.analysis.inertia.physical import (
     MIN_INERTIA,
@@ -21,9 +21,6 @@ from terrainkit_robots.description.model import Inertial, Link
 from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix, invert_poses
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.bodies.bodies import Body
-
 _MIN_ROUNDED_RATIO = 0.99
 """Moments that violate the triangle inequality by less are rounded or belong to a plate. A larger
 violation is an error of the robot and is kept."""
@@ -34,7 +31,7 @@ lose under rotation, and has no effect on the dynamics."""
 
 
 def with_valid_inertia(
-    bodies: Sequence["Body"], links: Sequence[Link], changes: list[str]
+    bodies: Sequence[Body], links: Sequence[Link], changes: list[str]
 ) -> list[Link]:
     """Return links with valid inertia, and note the changes.
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,24 +13,31 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.keyframe import keyframe_defect
 from terrainkit_robots.analysis.legs.wheels import turns_without_limits
+from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
+from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
-from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.export.unsupported import unsupported_elements
+from terrainkit_robots.export.urdf import urdf_text
+from terrainkit_robots.lint.rule import rules
+from terrainkit_robots.lint.runner import Report, lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import without_placeholder_efforts
 from terrainkit_robots.onboarding.source_model import with_compiled_gains
+from terrainkit_robots.simulation.declared_gains import standing_gains
+from terrainkit_robots.simulation.gain import GainSet
+from terrainkit_robots.simulation.pd_gains import suggest_training_gains
 from terrainkit_robots.spec.column import rounded_length
+from terrainkit_robots.spec.provenance import with_provenance
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
+from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.description.model import RobotModel
-    from terrainkit_robots.simulation.gain import GainSet
-    from terrainkit_robots.spec.robot_spec import RobotSpec
 
 URDF, MJCF, SCENE = "robot.urdf", "robot.xml", "scene.xml"
 """Names of the files in the folder, besides SPEC_FILE."""
@@ -50,7 +56,7 @@ class RobotFiles:
     facts: Facts
     """Facts of the robot as it is written."""
 
-    spec: "RobotSpec"
+    spec: RobotSpec
     """Its spec, as in robot.toml."""
 
     files: Mapping[str, bytes]
@@ -61,7 +67,7 @@ class RobotFiles:
 
 
 def convert(
-    report: Report, options: OnboardOptions, user_spec: "RobotSpec | None" = None
+    report: Report, options: OnboardOptions, user_spec: RobotSpec | None = None
 ) -> RobotFiles:
     """Return the files of a robot: robot.toml, robot.urdf, robot.xml, scene.xml and meshes.
 
@@ -75,12 +81,6 @@ def convert(
         TerrainkitError: if the file contains no robot, a mesh cannot be read, the overriding spec
             belongs to another robot, or MuJoCo rejects the robot.
     """
-    from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
-    from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
-    from terrainkit_robots.export.unsupported import unsupported_elements
-    from terrainkit_robots.export.urdf import urdf_text
-    from terrainkit_robots.spec.provenance import with_provenance
-
     source, effort_changes = without_placeholder_efforts(report)
     if source.model.kind == "mjcf":
         source = with_compiled_gains(source)
@@ -140,16 +140,12 @@ def convert(
     )
 
 
-def _derived_spec(facts: Facts, gain_set: "GainSet") -> "RobotSpec":
+def _derived_spec(facts: Facts, gain_set: GainSet) -> RobotSpec:
     """Return the derived spec.
 
     Raises:
         ExportError: if the robot cannot be simulated, so that no gains can be derived.
     """
-    from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-    from terrainkit_robots.simulation.declared_gains import standing_gains
-    from terrainkit_robots.simulation.pd_gains import suggest_training_gains
-
     try:
         gains = standing_gains(facts) if gain_set == "stand" else suggest_training_gains(facts)
     except CannotCheckError as error:
@@ -168,9 +164,6 @@ def _check_user_spec(facts: Facts, file: str) -> tuple[str, ...]:
     Raises:
         ConfigError: if the spec does not fit the robot.
     """
-    from terrainkit_robots.lint.rule import rules
-    from terrainkit_robots.lint.runner import lint
-
     spec = facts.required_spec
     joints = set(spec.joint_order)
     if joints and joints.isdisjoint(joint.name for joint in facts.joints):
@@ -186,7 +179,7 @@ def _check_user_spec(facts: Facts, file: str) -> tuple[str, ...]:
     return tuple(f"{file}: {finding.code}: {finding.message}" for finding in warnings)
 
 
-def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
+def _set_motor_limits(model: RobotModel, spec: RobotSpec) -> RobotModel:
     """Return a model whose joints have the effort and velocity limits of the spec.
 
     Damping of a joint that is its derivative gain in the spec is removed from the joint.
@@ -212,7 +205,7 @@ def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
     return replace(model, joints=joints, actuators=tuple(actuators))
 
 
-def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
+def _mjcf_text(facts: Facts, spec: RobotSpec, excluded: frozenset[frozenset[str]]) -> str:
     """Return robot.xml, in which pairs of links are excluded from contact."""
     merged = merge_fixed_joints(replace(facts.model, excluded=excluded), keep=spec.feet)
     columns = {name: spec.per_joint(name) for name in _ACTUATOR_FIELDS}
@@ -262,7 +255,7 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
     )
 
 
-def _replaced_ranges(model: "RobotModel") -> tuple[str, ...]:
+def _replaced_ranges(model: RobotModel) -> tuple[str, ...]:
     """Return one line if targets of the source differ from the limits of their joints."""
     limits = {joint.name: joint.range for joint in model.joints}
     found = [
@@ -276,7 +269,7 @@ def _replaced_ranges(model: "RobotModel") -> tuple[str, ...]:
     return (f"the limits of the joints replace the ctrlrange of {names(found, max_count=4)}",)
 
 
-def _held_joints(facts: Facts, spec: "RobotSpec") -> tuple[str, ...]:
+def _held_joints(facts: Facts, spec: RobotSpec) -> tuple[str, ...]:
     """Return one line if the last joints of legs turn without limits, but are held."""
     stiffness = spec.per_joint("stiffness")
     ends = [leg.joints[-1] for leg in facts.legs if not leg.limb.has_wheel]

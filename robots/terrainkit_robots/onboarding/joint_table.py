@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.simulation.declared_gains import declared_gains
+from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.spec.per_joint import match_joints
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.simulation.gain import Gain
-    from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _COLUMNS: Mapping[str, tuple[str, str, str]] = {
     "default_pose": ("default", "rad", "m"),
@@ -30,7 +27,7 @@ _MIN_DECIMAL, _MAX_DECIMAL = 1e-4, 1e4
 """Numbers beyond these limits are written in scientific notation."""
 
 
-def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
+def joint_table(facts: Facts, spec: RobotSpec) -> list[tuple[str, ...]]:
     """Return the rows of the table: a header with units, and one row per joint of the spec.
 
     The holding torque is the torque at the default pose, and its share of the effort.
@@ -77,7 +74,7 @@ def _with_units(title: str, units: Sequence[str], kinds: set[str]) -> str:
     return f"{title} [{' or '.join(used)}]" if used else title
 
 
-def _format_gain(gain: "Gain | None") -> str:
+def _format_gain(gain: Gain | None) -> str:
     return "" if gain is None else f"{format_number(gain.stiffness)}, {format_number(gain.damping)}"
 
 

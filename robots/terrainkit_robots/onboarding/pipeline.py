@@ -16,6 +16,10 @@ from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import check_and_repair
 from terrainkit_robots.onboarding.result import PUBLISHED, OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown
+from terrainkit_robots.onboarding.verify import verify
+from terrainkit_robots.rendering.child_process import RenderError
+from terrainkit_robots.rendering.norms_picture import draw_norms
+from terrainkit_robots.rendering.robot_images import render_robot
 from terrainkit_robots.spec.loops import LoopSpec, load_spec
 
 _MAP_FRAMEWORK = "leggedgym_ex"
@@ -107,11 +111,6 @@ def _write_folder(
     result: OnboardResult, target: Path, files: Mapping[str, bytes], options: OnboardOptions
 ) -> OnboardResult:
     """Write the folder, and return the result with its verification, pictures and edited files."""
-    from terrainkit_robots.onboarding.verify import verify
-    from terrainkit_robots.rendering.child_process import RenderError
-    from terrainkit_robots.rendering.norms_picture import draw_norms
-    from terrainkit_robots.rendering.robot_images import render_robot
-
     assert result.robot is not None
     edits = find_edits(target, files)
     with new_folder(target, overwrite=options.overwrite) as folder:

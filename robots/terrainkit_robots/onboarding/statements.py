@@ -9,7 +9,6 @@ import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.legs.closed_loops import largest_gap
@@ -20,17 +19,15 @@ from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_
 from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
 from terrainkit_robots.lint.rule import SEVERITIES, Finding
 from terrainkit_robots.onboarding.comparison import NUM_STATES, error_text
+from terrainkit_robots.onboarding.convert import RobotFiles
 from terrainkit_robots.onboarding.frameworks.frameworks import reads_mjcf
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.onboarding.result import PUBLISHED, OnboardResult
+from terrainkit_robots.onboarding.verify import Verification
 from terrainkit_robots.simulation.assessment import assess
+from terrainkit_robots.simulation.standing import StandResult
 from terrainkit_robots.text import count, display_path, names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.convert import RobotFiles
-    from terrainkit_robots.onboarding.verify import Verification
-    from terrainkit_robots.simulation.standing import StandResult
 
 _MAX_GAP = 0.001
 """Distance of the two ends of a loop above which it is open [m]."""
@@ -67,12 +64,12 @@ class Statement:
     """The line in the terminal."""
 
 
-def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
+def summarize(result: OnboardResult) -> Iterator[tuple[str, str]]:
     """Yield the label and the text of each line for the terminal."""
     return ((said.label, said.text) for said in statements(result) if said.label)
 
 
-def report_markdown(result: "OnboardResult") -> str:
+def report_markdown(result: OnboardResult) -> str:
     """Return the text of report.md for a robot that was written."""
     assert result.robot is not None
     sections: dict[str, list[str]] = {name: [] for name in _HEADINGS}
@@ -84,7 +81,7 @@ def report_markdown(result: "OnboardResult") -> str:
     return escape_surrogates("\n".join(lines))
 
 
-def statements(result: "OnboardResult") -> Iterator[Statement]:
+def statements(result: OnboardResult) -> Iterator[Statement]:
     """Yield what is said about a robot, in the order of the steps."""
     report = result.report
     yield Statement("findings", _findings(result), "checked", summarize_findings([report]))
@@ -127,7 +124,7 @@ def statements(result: "OnboardResult") -> Iterator[Statement]:
 # Check and repair
 
 
-def _findings(result: "OnboardResult") -> Iterator[str]:
+def _findings(result: OnboardResult) -> Iterator[str]:
     report = result.report
     yield f"**{summarize_findings([report])}** in the source file, after the fixes.\n"
     findings = sorted(report.findings, key=lambda f: (SEVERITIES.index(f.severity), f.code))
@@ -136,7 +133,7 @@ def _findings(result: "OnboardResult") -> Iterator[str]:
     yield from titled_list("Not checked or ignored", skipped)
 
 
-def _fixes(result: "OnboardResult") -> Iterator[Statement]:
+def _fixes(result: OnboardResult) -> Iterator[Statement]:
     """Yield what was fixed, and the repairs of inertias and mesh paths, which change the robot."""
     yield Statement("changes", _source(result))
     if not result.fixed:
@@ -153,7 +150,7 @@ def _fixes(result: "OnboardResult") -> Iterator[Statement]:
             yield Statement("changes", (), "repaired", text)
 
 
-def _source(result: "OnboardResult") -> Iterator[str]:
+def _source(result: OnboardResult) -> Iterator[str]:
     file = cell(display_path(result.report.facts.model.file))
     yield f"The source is {file}; it was not changed.\n"
 
@@ -174,7 +171,7 @@ def _repairable(findings: Sequence[Finding], family: str) -> list[str]:
 # Convert
 
 
-def _list_files(robot: "RobotFiles") -> str:
+def _list_files(robot: RobotFiles) -> str:
     meshes = [data for name, data in robot.files.items() if "/" in name]
     texts = [name for name in robot.files if "/" not in name]
     size = sum(map(len, meshes)) / 1e6
@@ -182,11 +179,11 @@ def _list_files(robot: "RobotFiles") -> str:
     return f"{names(texts)}{more}"
 
 
-def _properties(robot: "RobotFiles") -> Iterator[str]:
+def _properties(robot: RobotFiles) -> Iterator[str]:
     yield " ".join(_sentences(robot)) + "\n"
 
 
-def _sentences(robot: "RobotFiles") -> Iterator[str]:
+def _sentences(robot: RobotFiles) -> Iterator[str]:
     """Yield sentences on the size, the base and the legs of a robot."""
     facts, spec = robot.facts, robot.spec
     joints = count(len(spec.joint_order), "actuated joint")
@@ -224,7 +221,7 @@ def _is_finite(value: float | None) -> bool:
     return value is not None and math.isfinite(value)
 
 
-def _joints(robot: "RobotFiles") -> Iterator[str]:
+def _joints(robot: RobotFiles) -> Iterator[str]:
     spec = robot.spec
     if not spec.joint_order:
         return
@@ -241,7 +238,7 @@ def _joints(robot: "RobotFiles") -> Iterator[str]:
         yield f"Not actuated: {cell(', '.join(others))}.\n"
 
 
-def _simulators(robot: "RobotFiles") -> Iterator[str]:
+def _simulators(robot: RobotFiles) -> Iterator[str]:
     orders = robot.facts.simulator_orders
     if not robot.spec.joint_order or not any(order.joints for order in orders):
         return
@@ -281,7 +278,7 @@ def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 # Verify
 
 
-def _comparison(checks: "Verification") -> Iterator[Statement]:
+def _comparison(checks: Verification) -> Iterator[Statement]:
     """Yield the largest errors, and one line for each difference from the source."""
     errors = {compared.file: compared.errors for compared in checks.comparisons}
     if errors:
@@ -303,7 +300,7 @@ def _comparison(checks: "Verification") -> Iterator[Statement]:
         yield Statement("comparison", [f"- {cell(text)}\n"], "compared", text)
 
 
-def _loops(result: "OnboardResult", robot: "RobotFiles") -> Iterator[Statement]:
+def _loops(result: OnboardResult, robot: RobotFiles) -> Iterator[Statement]:
     """Yield whether the closed loops are closed, which joints move them, and who lacks them."""
     facts = robot.facts
     if not facts.loops:
@@ -321,7 +318,7 @@ def _loops(result: "OnboardResult", robot: "RobotFiles") -> Iterator[Statement]:
     yield Statement("comparison", [f"Loops: {cell(text)}.\n"], "loops", text)
 
 
-def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:
+def _standing(checks: Verification, robot: RobotFiles) -> Iterator[Statement]:
     text, lines = _standing_text(checks, robot), []
     if robot.facts.legs:
         lines = [f"{cell(text[0].upper() + text[1:])}.\n"]
@@ -339,7 +336,7 @@ def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement
     yield Statement("standing", [f"With free joints: {cell(text)}.\n"], "free", text)
 
 
-def _responses(checks: "Verification") -> Iterator[Statement]:
+def _responses(checks: Verification) -> Iterator[Statement]:
     if not checks.responses:
         return
     failed = [f"{found.joint} {found.failure}" for found in checks.responses if found.failure]
@@ -359,7 +356,7 @@ def _responses(checks: "Verification") -> Iterator[Statement]:
     yield Statement("responses", (intro, *_table(rows)), "responds", text)
 
 
-def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
+def _standing_text(checks: Verification, robot: RobotFiles) -> str:
     standing = checks.standing
     if checks.error or checks.skipped:
         return f"not simulated: {checks.error or checks.skipped}"
@@ -376,9 +373,7 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
 
 
-def _standing_rows(
-    standing: "StandResult", unit: str, *, locked: bool
-) -> Iterator[tuple[str, str]]:
+def _standing_rows(standing: StandResult, unit: str, *, locked: bool) -> Iterator[tuple[str, str]]:
     unstable = "; then the simulation became unstable" if standing.diverged else ""
     yield "duration", f"{format_number(standing.seconds)} s{unstable}"
     tilts = [format_number(math.degrees(t), 2) for t in (standing.tilt, standing.max_tilt)]
@@ -398,7 +393,7 @@ def _standing_rows(
 # Report
 
 
-def _pictures(result: "OnboardResult") -> Iterator[str]:
+def _pictures(result: OnboardResult) -> Iterator[str]:
     rendered = [name for name in result.images if name != PUBLISHED]
     if rendered:
         titles = [PurePath(name).stem for name in rendered]
@@ -412,7 +407,7 @@ def _pictures(result: "OnboardResult") -> Iterator[str]:
         yield f"![Masses, limits and gains among those of published robots]({PUBLISHED})\n"
 
 
-def _configs(result: "OnboardResult") -> Iterator[Statement]:
+def _configs(result: OnboardResult) -> Iterator[Statement]:
     """Yield the configurations of frameworks, and those that were skipped."""
     if result.configs:
         rows = [(files[0], "see its docstring") for files in result.configs.values()]
@@ -422,7 +417,7 @@ def _configs(result: "OnboardResult") -> Iterator[Statement]:
         yield Statement("next", (), "skipped", f"{framework}: {reason}")
 
 
-def _commands(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
+def _commands(result: OnboardResult, robot: RobotFiles) -> Iterator[str]:
     yield (
         "Edit robot.toml to change body names, the default pose, gains and limits. Run these "
         "commands in this folder.\n"

@@ -5,26 +5,33 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import mujoco
 
 from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.ball_joints import with_hinges_for_balls
 from terrainkit_robots.onboarding.comparison import Comparison, compare_models
-from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
+from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF, RobotFiles
 from terrainkit_robots.onboarding.source_model import described_model, load_source
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import SimModel
+from terrainkit_robots.simulation.standing import (
+    StandResult,
+    contact_areas,
+    ground_normal,
+    stand_test,
+    why_it_balances,
+)
+from terrainkit_robots.simulation.step_response import StepResponse, step_responses
 from terrainkit_robots.simulation.written_model import remove_drawings
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.onboarding.convert import RobotFiles
-    from terrainkit_robots.simulation.gain import Gain
-    from terrainkit_robots.simulation.standing import StandResult
-    from terrainkit_robots.simulation.step_response import StepResponse
-    from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _DURATION = 5.0
 """Duration of the standing test [s]."""
@@ -40,10 +47,10 @@ class Verification:
     uncompared: str = ""
     """The reason why MuJoCo cannot load an MJCF source, whose forces are then not compared."""
 
-    responses: "tuple[StepResponse, ...]" = ()
+    responses: tuple[StepResponse, ...] = ()
     """How the joints that a policy moves follow a step of their targets."""
 
-    standing: "StandResult | None" = None
+    standing: StandResult | None = None
     """Result of the standing test of scene.xml; None without legs, or with a fixed base."""
 
     joints_locked: bool = False
@@ -52,7 +59,7 @@ class Verification:
     stand_gains: bool = False
     """Whether the standing test used suggested gains instead of the spec's, which may be softer."""
 
-    free_standing: "StandResult | None" = None
+    free_standing: StandResult | None = None
     """Result with the gains of the spec and without locked joints, if the standing test used other
     gains or locked joints. A failure is expected: the policy has to balance the robot."""
 
@@ -85,8 +92,8 @@ class Verification:
 
 
 def verify(
-    source: "Facts",
-    robot: "RobotFiles",
+    source: Facts,
+    robot: RobotFiles,
     folder: Path,
     *,
     soft_gains: bool = False,
@@ -104,16 +111,6 @@ def verify(
     Raises:
         ExportError: if MuJoCo cannot load the files.
     """
-    from terrainkit_robots.simulation.pd_gains import suggest_gains
-    from terrainkit_robots.simulation.sim_model import SimModel
-    from terrainkit_robots.simulation.standing import (
-        contact_areas,
-        ground_normal,
-        stand_test,
-        why_it_balances,
-    )
-    from terrainkit_robots.simulation.step_response import step_responses
-
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
@@ -163,7 +160,7 @@ def verify(
 
 
 def _compare(
-    source: "Facts", robot: "RobotFiles", models: Mapping[str, Any], ignored: Collection[str]
+    source: Facts, robot: RobotFiles, models: Mapping[str, Any], ignored: Collection[str]
 ) -> Verification:
     """Return the comparison of the models of the written files with their source."""
     written = robot.facts
@@ -195,8 +192,6 @@ def _compare(
 
 def _load_model(path: Path) -> tuple[Any, Any]:
     """Return the specification and the model of a file, without shapes that are only drawn."""
-    import mujoco
-
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         written = {mesh.name: (mesh.file, mesh.scale.tolist()) for mesh in spec.meshes}
@@ -218,9 +213,7 @@ def _load_model(path: Path) -> tuple[Any, Any]:
         raise ExportError(f"MuJoCo cannot load the written {path.name}: {reason}") from None
 
 
-def _gains(spec: "RobotSpec") -> "dict[str, Gain]":
-    from terrainkit_robots.simulation.gain import Gain
-
+def _gains(spec: RobotSpec) -> dict[str, Gain]:
     stiffness, damping, armature = map(spec.per_joint, ("stiffness", "damping", "armature"))
     return {
         joint: Gain(

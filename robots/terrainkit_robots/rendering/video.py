@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, ExportError, one_line
+from terrainkit.files.atomic_write import atomic_write, check_target
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import Frame, stream_frames
 
@@ -77,8 +78,6 @@ def check_video_path(path: Path, *, overwrite: bool = False) -> None:
         ConfigError: if the suffix is not .mp4.
         ExportError: if the file cannot be written.
     """
-    from terrainkit.files.atomic_write import check_target
-
     if path.suffix != ".mp4":
         raise ConfigError(f"video file: got {path.name}; expected a name that ends in .mp4")
     check_target(path, overwrite=overwrite)
@@ -93,8 +92,6 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
         RenderError: if MuJoCo cannot render on this machine.
     """
     from imageio_ffmpeg import count_frames_and_secs, write_frames
-
-    from terrainkit.files.atomic_write import atomic_write
 
     check_video_path(path, overwrite=overwrite)
     with atomic_write(path, overwrite=overwrite) as target:

@@ -1,19 +1,17 @@
 """Read the colors of URDF materials, by value or by name."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+
+from lxml import etree
 
 from terrainkit_robots.description.urdf.tags import has_variable
 from terrainkit_robots.description.xml.numbers import parse_numbers
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 Color = tuple[float, float, float, float]
 """Red, green, blue and opacity in [0, 1]."""
 
 
-def named_colors(root: "etree._Element") -> dict[str, Color]:
+def named_colors(root: etree._Element) -> dict[str, Color]:
     """Return the colors of all named materials of a robot.
 
     Materials of the robot take precedence over materials of links; the first of a name counts.
@@ -27,7 +25,7 @@ def named_colors(root: "etree._Element") -> dict[str, Color]:
     return colors
 
 
-def undefined_materials(root: "etree._Element") -> Iterator["etree._Element"]:
+def undefined_materials(root: etree._Element) -> Iterator[etree._Element]:
     """Yield the first use of each named material that has neither color nor texture anywhere."""
     materials = [*root.iterfind("material"), *root.iterfind("link/visual/material")]
     seen = {
@@ -40,7 +38,7 @@ def undefined_materials(root: "etree._Element") -> Iterator["etree._Element"]:
             yield material
 
 
-def color_of(shape: "etree._Element", named: Mapping[str, Color]) -> Color | None:
+def color_of(shape: etree._Element, named: Mapping[str, Color]) -> Color | None:
     """Return the color of a <visual>; None if it has no valid color."""
     material = shape.find("material")
     if material is None:
@@ -50,11 +48,11 @@ def color_of(shape: "etree._Element", named: Mapping[str, Color]) -> Color | Non
     )
 
 
-def _name(material: "etree._Element") -> str:
+def _name(material: etree._Element) -> str:
     return str(material.get("name", "")).strip()
 
 
-def _material_color(material: "etree._Element") -> Color | None:
+def _material_color(material: etree._Element) -> Color | None:
     color = material.find("color")
     numbers = None if color is None else parse_numbers(color.get("rgba", ""), 4)
     if numbers is None or numbers.min() < 0 or numbers.max() > 1:

@@ -1,9 +1,9 @@
 """Read the SDF joints in the <gazebo> elements of a URDF, which close loops."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+from lxml import etree
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import truncate
@@ -12,17 +12,14 @@ from terrainkit_robots.description.model import Loop, RobotModel
 from terrainkit_robots.description.xml.numbers import parse_numbers
 from terrainkit_robots.transforms import rpy_to_matrix
 
-if TYPE_CHECKING:
-    from lxml import etree
-
 _CONNECTED = ("revolute", "continuous", "ball")
 """Types of joints that become a connect. The other joints of a loop keep the axis of a hinge, as in
 a planar linkage."""
 
 
 def gazebo_loops(
-    root: "etree._Element", robot: RobotModel
-) -> Iterator[tuple["etree._Element", Loop | str]]:
+    root: etree._Element, robot: RobotModel
+) -> Iterator[tuple[etree._Element, Loop | str]]:
     """Yield each SDF joint with the loop that it closes, or why it closes none.
 
     Args:
@@ -41,7 +38,7 @@ def gazebo_loops(
             yield element, str(error)
 
 
-def _loop(element: "etree._Element", number: int, robot: RobotModel) -> Loop:
+def _loop(element: etree._Element, number: int, robot: RobotModel) -> Loop:
     """Return the loop that a joint closes, or raise ConfigError."""
     kind = element.get("type", "")
     if kind not in (*_CONNECTED, "fixed"):

@@ -5,7 +5,9 @@ Simulators skip these tags, so that a mistake appears only in the tool that read
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+from lxml import etree
 
 from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.description.model import Problem
@@ -13,14 +15,11 @@ from terrainkit_robots.description.urdf.tags import has_variable
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.numbers import parse_numbers
 
-if TYPE_CHECKING:
-    from lxml import etree
-
 
 class Reference(NamedTuple):
     """A name in an element that refers to a link or a joint."""
 
-    element: "etree._Element"
+    element: etree._Element
     """The element."""
 
     place: str
@@ -93,7 +92,7 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
     yield from found.values()
 
 
-def _references(root: "etree._Element") -> Iterator[Reference]:
+def _references(root: etree._Element) -> Iterator[Reference]:
     for element in root.iterchildren("gazebo", "transmission", "sensor", "ros2_control"):
         if element.tag == "gazebo":
             name = element.get("reference", "")
@@ -115,7 +114,7 @@ def _references(root: "etree._Element") -> Iterator[Reference]:
                     yield Reference(param, place, "joint", (param.text or "").strip())
 
 
-def _driven_joint(transmission: "etree._Element") -> str:
+def _driven_joint(transmission: etree._Element) -> str:
     joint = transmission.find("joint")
     return "" if joint is None else joint.get("name", "")
 

@@ -2,16 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import trimesh
 
 from terrainkit_robots.description.model import ShapeKind
 from terrainkit_robots.export.collision_simplification.oriented_box import oriented_box
 from terrainkit_robots.transforms import Matrix
-
-if TYPE_CHECKING:
-    import trimesh
 
 _MAX_VOLUME_RATIO = 0.98
 """A shape with more expensive collision checks must have less than this share of the volume."""
@@ -39,8 +36,6 @@ def fit_primitive(points: Matrix) -> PrimitiveFit:
     Args:
         points: Points that do not lie in a plane, shape (n, 3) [m].
     """
-    import trimesh
-
     best: PrimitiveFit | None = None
     for candidate in _candidates(trimesh.convex.convex_hull(points)):
         if best is None or candidate.volume < _MAX_VOLUME_RATIO * best.volume:
@@ -49,10 +44,8 @@ def fit_primitive(points: Matrix) -> PrimitiveFit:
     return best
 
 
-def _candidates(hull: "trimesh.Trimesh") -> Iterator[PrimitiveFit]:
+def _candidates(hull: trimesh.Trimesh) -> Iterator[PrimitiveFit]:
     """Yield the primitives around a convex hull, the cheapest to collide with first."""
-    import trimesh
-
     points = np.asarray(hull.vertices, dtype=np.float64)
     center, radius = trimesh.nsphere.minimum_nsphere(points)
     yield PrimitiveFit(
@@ -77,8 +70,6 @@ def _candidates(hull: "trimesh.Trimesh") -> Iterator[PrimitiveFit]:
 
 def _capsule(points: Matrix, axis: Matrix) -> PrimitiveFit:
     """Return the smallest capsule along an axis that encloses points."""
-    import trimesh
-
     rotation = np.linalg.inv(trimesh.geometry.align_vectors(axis, [0, 0, 1])[:3, :3])
     local = points @ rotation
     center, radius = trimesh.nsphere.minimum_nsphere(local[:, :2])

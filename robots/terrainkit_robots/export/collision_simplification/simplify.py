@@ -14,7 +14,6 @@ import numpy as np
 
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
-from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, scaled
@@ -153,6 +152,8 @@ class _Simplifier:
         return shapes, "its convex hull", abs(signed_volume(hull))
 
     def _primitive(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
+        from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
+
         hull = self._hull(mesh, None)
         fitted = fit_primitive(hull.points.astype(np.float64))
         shape = Geometry(

@@ -2,17 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from terrainkit.errors import one_line
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Joint
+from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
-
-if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain
 
 _DEFAULT_ERROR = {"revolute": 1.0, "prismatic": 0.1}
 """Position error at which a motor of unknown effort saturates [rad] or [m]."""
@@ -44,7 +41,7 @@ _MAX_RANGE_FACTOR = 0.25
 
 
 def effort_column(
-    facts: Facts, gains: "Mapping[str, Gain]", mirror: Mapping[str, MirrorJoint]
+    facts: Facts, gains: Mapping[str, Gain], mirror: Mapping[str, MirrorJoint]
 ) -> Column:
     """Return the effort limit of each joint [N m] or [N].
 
@@ -100,7 +97,7 @@ def velocity_column(facts: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
     }
 
 
-def armature_column(facts: Facts, gains: "Mapping[str, Gain]") -> Column:
+def armature_column(facts: Facts, gains: Mapping[str, Gain]) -> Column:
     """Return the armature of each joint [kg m2] or [kg]."""
     column: Column = {}
     for joint in facts.actuated:
@@ -115,7 +112,7 @@ def armature_column(facts: Facts, gains: "Mapping[str, Gain]") -> Column:
 
 
 def action_scale_column(
-    facts: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
+    facts: Facts, gains: Mapping[str, Gain], effort: Column, velocity: Column
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 

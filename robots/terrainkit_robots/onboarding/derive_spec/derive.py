@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +19,12 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     velocity_column,
 )
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
+from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded, rounded_length
 from terrainkit_robots.spec.loops import closed_loops
 from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
-
-if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain
 
 _SOFT_LIMIT_FACTOR = 0.9
 """Share of the joint range within the soft limits, as in legged_gym and Isaac Lab."""
@@ -42,7 +40,7 @@ Isaac Lab resets its bipeds at the default pose. Quadrupeds also stand with larg
 def derive_spec(
     facts: Facts,
     *,
-    gains: "Mapping[str, Gain]",
+    gains: Mapping[str, Gain],
     floating: bool,
     urdf: str = "robot.urdf",
     mjcf: str = "robot.xml",
@@ -111,7 +109,7 @@ def derive_spec(
     )
 
 
-def _pose_and_gain_columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
+def _pose_and_gain_columns(facts: Facts, gains: Mapping[str, Gain]) -> dict[str, Column]:
     pose: Column = {}
     stiffness: Column = {}
     damping: Column = {}

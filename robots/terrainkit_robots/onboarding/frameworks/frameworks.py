@@ -11,21 +11,18 @@ from functools import cache
 from pathlib import Path
 from statistics import fmean
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.export.sites import pose_in_body
 from terrainkit_robots.onboarding import frameworks
 from terrainkit_robots.onboarding.derive_spec.named_bodies import body_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.legged_robot import check_legs
 from terrainkit_robots.spec.robot_spec import RobotSpec
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.analysis.legs.legs import Leg
 
 
 @cache
@@ -96,7 +93,7 @@ def train_commands(name: str, spec: RobotSpec, folder: Path) -> tuple[str, list[
 
 
 def robot_config_files(
-    name: str, facts: "Facts", spec: RobotSpec, *, has_map: bool = False
+    name: str, facts: Facts, spec: RobotSpec, *, has_map: bool = False
 ) -> dict[str, str]:
     """Return the files for a framework of a robot whose facts are known.
 
@@ -126,7 +123,7 @@ def robot_config_files(
     return config_files(name, robot)
 
 
-def _foot_height(facts: "Facts", spec: RobotSpec) -> float:
+def _foot_height(facts: Facts, spec: RobotSpec) -> float:
     """Return the mean height of the frames of the feet on the ground, at the default pose [m]."""
     if facts.stance is None or not spec.feet:
         return 0.0
@@ -139,7 +136,7 @@ def _foot_height(facts: "Facts", spec: RobotSpec) -> float:
     return float(facts.stance.height + fmean(frame[2, 3] for frame in frames))
 
 
-def _roles(leg: "Leg") -> dict[str, str]:
+def _roles(leg: Leg) -> dict[str, str]:
     """Return the role of each joint of a leg; joints below the knee belong to the ankle."""
     roles: dict[str, str] = {}
     for joint, role in zip(leg.joints, leg.roles, strict=True):
