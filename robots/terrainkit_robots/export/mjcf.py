@@ -4,7 +4,7 @@ The base is the only body of the world, so that the file can be attached to any 
 mass: all mass is in the `inertial` of each body.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
@@ -62,9 +62,6 @@ class Extras:
     frames: tuple[Site, ...] = ()
     """Frames of links that were merged."""
 
-    excluded: Iterable[frozenset[str]] = ()
-    """Pairs of bodies without contacts."""
-
     keyframe: Mapping[str, float] = field(default_factory=dict)
     """Joint positions of the keyframe [rad] or [m]; other joints are at 0."""
 
@@ -99,7 +96,7 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     if model.floating:
         name = free_name("root", {joint.name for joint in model.joints})
         base.insert(0, etree.Element("freejoint", name=name))
-    _contact(root, extras)
+    _contact(root, model)
     _tendons(root, model)
     _equality(root, model)
     _actuators(root, model, extras)
@@ -340,9 +337,9 @@ def _site(body: Any, site: Site) -> None:
         element.set("size", number_text(site.half_size))
 
 
-def _contact(root: Any, extras: Extras) -> None:
+def _contact(root: Any, model: RobotModel) -> None:
     contact = etree.SubElement(root, "contact")
-    for first, second in sorted(tuple(sorted(pair)) for pair in extras.excluded):
+    for first, second in sorted(tuple(sorted(pair)) for pair in model.excluded):
         etree.SubElement(contact, "exclude", body1=first, body2=second)
 
 

@@ -236,7 +236,6 @@ def _mjcf_text(facts: Facts, spec: RobotSpec, excluded: frozenset[frozenset[str]
         feet=foot_sites(facts, spec.feet),
         imu=imu,
         frames=tuple(frames),
-        excluded=merged.model.excluded,
         keyframe=facts.default_pose,
         height=height,
         height_at_zero=max(height, rounded_length(_clearance(facts, {}))) if facts.stance else None,

@@ -155,7 +155,6 @@ def make_sim_model(facts: Facts) -> SimModel:
     }
     extras = Extras(
         actuators=actuators,
-        excluded=model.excluded,
         keyframe=facts.default_pose,
         height=facts.stance.height if facts.stance else 1.0,
         time_step=TIME_STEP,
