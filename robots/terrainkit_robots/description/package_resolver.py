@@ -9,7 +9,7 @@ and nothing is downloaded.
 import os
 import re
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -88,12 +88,9 @@ class PackageResolver:
             name = name if exists(self._folder / name) else unquote(name)
         elif _SCHEME.match(filename) and not _DRIVE.match(filename):
             return _join(self._folder, filename.rpartition("/")[2]), "nothing"  # a URL
-        written = _join(self._folder, name)
-        if name and "\0" not in name and exists(written):
-            return written, "path"
-        found = None if is_absolute(name) else find_ignore_case(self._folder, name)
-        found = found or self._search_nearby(name)
-        return (found, "search") if found else (written, "nothing")
+        path, how = resolve_in(self._folder, name)
+        found = self._search_nearby(name) if how == "nothing" else None
+        return (found, "search") if found else (path, how)
 
     def _search_nearby(self, name: str) -> Path | None:
         """Return a file in a nearby folder whose path has the same end."""
@@ -202,28 +199,23 @@ class PackageResolver:
 _MESH_FOLDERS = {"meshes", "mesh", "assets", "stl", "dae", "obj", "visual", "collision"}
 
 
-def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
-    """Resolve a file name in a list of folders.
+def resolve_in(folder: Path, filename: str) -> tuple[Path, FoundBy]:
+    """Resolve a file name in a folder.
 
     Args:
-        folders: Folders, starting with the expected folder.
+        folder: The folder.
         filename: Name of a file, as written in the robot file.
 
     Returns:
-        The path and how it was found: `path` if a folder has the file, `search` if a folder has it
-        with different letter case, `nothing` with the path in the first folder otherwise.
+        The path and how it was found: `path` if the folder has the file, `search` if it has it with
+        different letter case, `nothing` with the expected path otherwise.
     """
-    paths = list(folders)
     filename = filename[:_MAX_LENGTH]
-    for folder in paths:
-        if "\0" not in filename and exists(_join(folder, filename)):
-            return _join(folder, filename), "path"
-    if not is_absolute(filename):
-        for folder in paths:
-            found = find_ignore_case(folder, filename)
-            if found is not None:
-                return found, "search"
-    return _join(paths[0], filename), "nothing"
+    written = _join(folder, filename)
+    if filename and "\0" not in filename and exists(written):
+        return written, "path"
+    found = None if is_absolute(filename) else find_ignore_case(folder, filename)
+    return (found, "search") if found else (written, "nothing")
 
 
 def is_package_uri(filename: str) -> bool:
@@ -244,13 +236,10 @@ def find_ignore_case(folder: Path, name: str) -> Path | None:
         return None
     at = folder
     for part in parts:
-        if part == ".." or exists(at / part):
-            at = at / part
-            continue
-        matches = [entry for entry in _list_names(at) if entry.lower() == part.lower()]
-        if len(matches) != 1:
+        listed = part if part == ".." or exists(at / part) else _listed_name(at, part)
+        if listed is None:
             return None
-        at = at / matches[0]
+        at = at / listed
     return at if exists(at) else None
 
 
@@ -296,13 +285,15 @@ def _names_on_disk(path: Path, count: int) -> list[str]:
         if len(names) == count:
             break
         if at.name not in ("", ".", ".."):
-            entries = _list_names(at.parent)
-            name = at.name
-            if name not in entries:
-                matches = [entry for entry in entries if entry.lower() == name.lower()]
-                name = matches[0] if len(matches) == 1 else name
-            names.append(name)
+            names.append(_listed_name(at.parent, at.name) or at.name)
     return names[::-1]
+
+
+def _listed_name(folder: Path, name: str) -> str | None:
+    """Return a name in a folder, or the only one that differs in letter case, or None."""
+    entries = _list_names(folder)
+    matches = [entry for entry in entries if entry.lower() == name.lower()]
+    return name if name in entries else matches[0] if len(matches) == 1 else None
 
 
 def exists(path: Path) -> bool:

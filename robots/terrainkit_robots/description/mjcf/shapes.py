@@ -68,7 +68,7 @@ def mesh_file(mesh: Any, node: Node, strip: bool) -> MeshFile | None:
         return None
     x, y, z = map(float, mesh.scale)
     folder = node.folder / str(mesh.compiler.meshdir or "")
-    path, found_by = resolve_in((folder,), Path(name).name if strip else name)
+    path, found_by = resolve_in(folder, Path(name).name if strip else name)
     return MeshFile(
         source=node.source,
         filename=name,
