@@ -94,17 +94,9 @@ _URDF_CONTENT = (
 )
 """What a link or joint of URDF has, but one of SDF has not, as paths."""
 
-_SINGLE_CHILDREN: Mapping[str, tuple[str, ...]] = {
-    "link": ("inertial",),
-    "inertial": ("origin", "mass", "inertia"),
-    "visual": ("origin", "geometry"),
-    "collision": ("origin", "geometry"),
-    "joint": (
-        *("origin", "parent", "child", "axis", "limit", "mimic"),
-        *("dynamics", "calibration", "safety_controller"),
-    ),
-}
-"""Children that an element may have only once. XML008 reports repeated materials."""
+_SINGLE = _CHILDREN["inertial"] | _CHILDREN["joint"] | {"inertial", "geometry"}
+"""Elements that a link, joint, inertial or shape may have only once. XML008 reports repeated
+materials."""
 
 _MIN_ATTRIBUTE_SIMILARITY, _MIN_TAG_SIMILARITY = 0.6, 0.75
 """Minimum difflib ratio of a misspelled name. Tools add elements of their own, so elements have to
@@ -128,10 +120,10 @@ def unexpanded_xacro(root: "etree._Element") -> Iterator[tuple["etree._Element",
 
 def repeated_children(root: "etree._Element") -> Iterator["etree._Element"]:
     """Yield elements that may occur once in a link or joint, but are repeated."""
-    for parent in root.iter(*_SINGLE_CHILDREN):
+    for parent in root.iter("link", "inertial", "visual", "collision", "joint"):
         if _is_described(parent):
             seen: set[str] = set()
-            for child in parent.iterchildren(*_SINGLE_CHILDREN[parent.tag]):
+            for child in parent.iterchildren(*_SINGLE & _CHILDREN[parent.tag]):
                 if child.tag in seen:
                     yield child
                 seen.add(child.tag)
