@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -60,12 +60,9 @@ def contrast(value: float, limit: float, spec: str) -> tuple[str, str]:
     return texts[0], re.sub(r"\.0+(?=%?$)", "", texts[1])
 
 
-def free_name(name: str, used_names: Container[str]) -> str:
+def free_name(name: str, used_names: Iterable[str]) -> str:
     """Return `name`, or the first of name_2, name_3, ... that is not taken."""
-    free, number = name, 2
-    while free in used_names:
-        free, number = f"{name}_{number}", number + 1
-    return free
+    return UniqueNames(used_names).add(name)
 
 
 class UniqueNames:

@@ -5,6 +5,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
 from terrainkit_robots.spec.per_joint import match_joints
+from terrainkit_robots.text import group
 
 T = TypeVar("T", bound=Hashable)
 
@@ -30,9 +31,7 @@ def by_pattern(table: Mapping[str, T], joints: Sequence[str]) -> dict[str, T]:
         table: Value of each joint; joints may be missing.
         joints: Names of all joints.
     """
-    groups: dict[T, list[str]] = {}
-    for joint, value in table.items():
-        groups.setdefault(value, []).append(joint)
+    groups = group((value, joint) for joint, value in table.items())
     result = {
         pattern: value
         for value, names in groups.items()

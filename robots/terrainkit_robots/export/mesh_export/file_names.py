@@ -3,6 +3,8 @@
 import hashlib
 import re
 
+from terrainkit_robots.text import UniqueNames
+
 _MAX_LENGTH = 80
 """Maximum length of a name; paths on Windows have at most 260 characters."""
 
@@ -17,7 +19,7 @@ class FileNames:
         """Create an empty set of files in `folder`."""
         self._folder = folder
         self._by_content: dict[tuple[str, bytes], str] = {}
-        self._used_stems: set[str] = set()
+        self._stems = UniqueNames()
         self.files: dict[str, bytes] = {}
         """Content by name, in the order of insertion."""
 
@@ -34,18 +36,12 @@ class FileNames:
         """
         key = suffix, hashlib.sha256(data).digest()
         if key not in self._by_content:
-            name = f"{self._folder}/{self._unused_stem(_sanitize(stem))}{suffix}"
+            plain = _sanitize(stem)
+            number = self._stems.add(plain.lower()).removeprefix(plain.lower())
+            name = f"{self._folder}/{plain}{number}{suffix}"
             self._by_content[key] = name
             self.files[name] = data
         return self._by_content[key]
-
-    def _unused_stem(self, stem: str) -> str:
-        free, number = stem, 1
-        while free.lower() in self._used_stems:
-            number += 1
-            free = f"{stem}_{number}"
-        self._used_stems.add(free.lower())
-        return free
 
 
 def _sanitize(name: str) -> str:

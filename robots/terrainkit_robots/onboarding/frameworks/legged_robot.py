@@ -12,7 +12,7 @@ from terrainkit_robots.onboarding.frameworks.substrings import (
     gain_keys,
     keys_for,
 )
-from terrainkit_robots.text import names
+from terrainkit_robots.text import group, names
 
 BEFORE_IMPORTS = ["# ruff: noqa: RUF012", "", "from pathlib import Path", ""]
 """The first lines of a configuration. RUF012 is about mutable class attributes."""
@@ -79,9 +79,7 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     result = gain_keys(robot.spec.joint_order, pairs)
     values = {key: pairs[key] for key in result.keys}
-    groups: dict[tuple[float, float], list[str]] = {}
-    for joint, pair in pairs.items():
-        groups.setdefault(pair, []).append(joint)
+    groups = group((pair, joint) for joint, pair in pairs.items())
     shared = {pair: keys_for(joints, robot.spec.joint_order) for pair, joints in groups.items()}
     if not any(keys.clashes for keys in shared.values()):
         result = Keys(keys=tuple(key for keys in shared.values() for key in keys.keys))
