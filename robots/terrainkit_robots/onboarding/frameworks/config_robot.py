@@ -15,10 +15,13 @@ from terrainkit_robots.onboarding.frameworks.source import (
     float_literal,
     format_collection,
 )
-from terrainkit_robots.spec.per_joint import by_joint, match_joints
+from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of
 
 _Value = TypeVar("_Value")
+
+_OPTIONAL = frozenset({"effort", "velocity", "armature", "soft_limits"})
+"""Fields of the spec that joints may lack."""
 
 DEFAULT_SOFT_LIMIT_FACTOR = 0.9
 """Soft limit factor of robots with unknown joint limits, as in legged_gym and Isaac Lab."""
@@ -91,7 +94,7 @@ class ConfigRobot:
         Raises:
             ConfigError: if the stiffness or damping of a joint is missing.
         """
-        stiffness, damping = map(self.all_joint_values, ("stiffness", "damping"))
+        stiffness, damping = map(self.joint_values, ("stiffness", "damping"))
         return tuple(
             joint for joint in self.spec.joint_order if stiffness[joint] == 0 < damping[joint]
         )
@@ -102,24 +105,17 @@ class ConfigRobot:
         return tuple(joint for joint in self.spec.joint_order if joint not in self.velocity_joints)
 
     def joint_values(self, field: str) -> dict[str, float]:
-        """Return the values of a field of the spec by joint; joints may be missing.
+        """Return the values of a field of the spec by joint.
 
         Raises:
-            ConfigError: if two keys match a joint, or a key matches no joint.
+            ConfigError: if two keys match a joint, a key matches no joint, or a joint has no value,
+                unless frameworks do without it.
         """
         return self._match(field, getattr(self.spec, field))
 
-    def all_joint_values(self, field: str) -> dict[str, float]:
-        """Return the values of a field of the spec for every joint.
-
-        Raises:
-            ConfigError: if a joint is not matched exactly once, or a key matches no joint.
-        """
-        return by_joint(getattr(self.spec, field), self.spec.joint_order, field)
-
     def _match(self, field: str, values: Mapping[str, _Value]) -> dict[str, _Value]:
         matching = match_joints(values, self.spec.joint_order)
-        for error in matching.errors(field, partial=True):
+        for error in matching.errors(field, partial=field in _OPTIONAL):
             raise ConfigError(error.message)
         return dict(matching.values)
 
@@ -153,7 +149,7 @@ class ConfigRobot:
 
     def action_scales(self, joints: Iterable[str]) -> dict[str, float]:
         """Return the action scales of some joints."""
-        scales = self.all_joint_values("action_scale")
+        scales = self.joint_values("action_scale")
         return {joint: scales[joint] for joint in joints}
 
     def scale_table(self, name: str, target: Literal["position", "velocity"]) -> list[str]:

@@ -15,8 +15,6 @@ _TABLES = {
     "ARMATURE": "armature",
 }
 
-_REQUIRED = ("default_pose", "stiffness", "damping")
-
 
 def config_text(robot: ConfigRobot) -> str:
     """Return the text of `genesis_config.py`."""
@@ -24,9 +22,7 @@ def config_text(robot: ConfigRobot) -> str:
     config = source.fill(
         "genesis_config",
         about=source.docstring(_about(robot)),
-        robot_urdf=source.sum_assignment(
-            "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
-        ),
+        robot_urdf=source.path_assignment("ROBOT_URDF", spec.urdf),
         spawn_height=robot.provenance_comment("spawn_height", prefix="x, y, z"),
         height=source.float_literal(spec.spawn_height or 0.0),
         fixed=str(not spec.floating),
@@ -81,6 +77,6 @@ def _bodies(robot: ConfigRobot) -> list[str]:
 
 
 def _table(robot: ConfigRobot, name: str, field: str) -> list[str]:
-    values = robot.all_joint_values(field) if field in _REQUIRED else robot.joint_values(field)
-    lines = source.format_collection(f"{name} = ", source.dict_entries(values), "{}")
+    entries = source.dict_entries(robot.joint_values(field))
+    lines = source.format_collection(f"{name} = ", entries, "{}")
     return [*robot.provenance_comment(field), *lines]

@@ -15,7 +15,7 @@ def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int
         patterns: A pattern that matches each joint.
         depth: Indentation of the fields, in steps of four spaces.
     """
-    pose = robot.all_joint_values("default_pose")
+    pose = robot.joint_values("default_pose")
     entries = source.dict_entries(merge_patterns(pose, patterns))
     return [
         *robot.provenance_comment("spawn_height", depth=depth, prefix="x, y, z"),

@@ -64,9 +64,7 @@ def config_text(robot: ConfigRobot) -> str:
         about=source.docstring(_about(robot, name, is_legged)),
         kinds=", ".join(sorted(set(actuators.values()))),
         task_imports=_TASK_IMPORTS if is_legged else [],
-        urdf=source.sum_assignment(
-            "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
-        ),
+        urdf=source.path_assignment("ROBOT_URDF", spec.urdf),
         name=name,
         fix_base=str(not spec.floating),
         merge="not IS_ISAACLAB_3" if is_legged and robot.has_fixed_feet else "True",
@@ -147,8 +145,7 @@ def _actuator(robot: ConfigRobot, name: str, kind: str, joints: Sequence[str]) -
     names = source.format_strings(merge_names(joints, patterns))
     lines = source.format_collection("joint_names_expr=", names, depth=3, suffix=",")
     for field, key in _FIELDS[kind].items():
-        required = field in ("stiffness", "damping")
-        known = robot.all_joint_values(key) if required else robot.joint_values(key)
+        known = robot.joint_values(key)
         values = {joint: known[joint] for joint in joints if joint in known}
         if values:
             lines += robot.provenance_comment(key, depth=3)

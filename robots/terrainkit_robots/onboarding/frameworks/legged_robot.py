@@ -58,7 +58,7 @@ def check_legs(robot: ConfigRobot, name: str, others: Sequence[str]) -> None:
 def init_state(robot: ConfigRobot) -> list[str]:
     """Return the spawn position and the default joint angles."""
     height = source.float_literal(robot.spec.spawn_height or 0.0)
-    angles = robot.all_joint_values("default_pose")
+    angles = robot.joint_values("default_pose")
     entries = source.dict_entries(angles)
     return [
         *robot.provenance_comment("spawn_height", depth=2, prefix="x, y, z"),
@@ -75,7 +75,7 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
         robot: The robot.
         clash_note: How the framework handles several keys that match a joint.
     """
-    stiffness, damping = robot.all_joint_values("stiffness"), robot.all_joint_values("damping")
+    stiffness, damping = robot.joint_values("stiffness"), robot.joint_values("damping")
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     result = gain_keys(robot.spec.joint_order, pairs)
     values = {key: pairs[key] for key in result.keys}
@@ -174,8 +174,8 @@ def asset_name(robot: ConfigRobot) -> str:
 def path_in_folder(attribute: str, name: str) -> list[str]:
     """Return a statement with the path of a file in the folder of the configuration."""
     escaped = name.replace("{", "{{").replace("}", "}}")
-    return source.sum_assignment(
-        attribute, "HERE", "+", source.string_literal("/" + escaped), depth=2
+    return source.assignment(
+        attribute, "HERE", f"+ {source.string_literal('/' + escaped)}", depth=2
     )
 
 

@@ -65,9 +65,7 @@ def config_text(robot: ConfigRobot) -> str:
         standard=_STANDARD_IMPORTS if has_task else [],
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
         task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
-        robot_xml=source.sum_assignment(
-            "ROBOT_XML", source.PARENT_FOLDER, "/", source.string_literal(robot.spec.mjcf)
-        ),
+        robot_xml=source.path_assignment("ROBOT_XML", robot.spec.mjcf),
         init_state=initial_state(robot, patterns, depth=1),
         articulation=_articulation(robot, patterns),
         scales=_scales(robot, patterns),
@@ -110,12 +108,7 @@ def _training(robot: ConfigRobot) -> list[str]:
 
 def _articulation(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     """Return the source of the actuators; joints with the same values share an actuator."""
-    tables = {
-        field: robot.joint_values(key)
-        if field in ("effort_limit", "armature")
-        else robot.all_joint_values(key)
-        for field, key in _FIELDS.items()
-    }
+    tables = {field: robot.joint_values(key) for field, key in _FIELDS.items()}
     groups: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.spec.joint_order:
         is_wheel = joint in robot.velocity_joints

@@ -15,9 +15,6 @@ from terrainkit.errors import ConfigError, one_line
 WIDTH = 88
 """Maximum line length, the default of ruff and black."""
 
-PARENT_FOLDER = "Path(__file__).resolve().parent"
-"""Expression for the folder of the configuration and the robot."""
-
 GENERATED_NOTE = (
     "Written by terrainkit from robot.toml. Comments before values state units and provenance. SI "
     "units and radians."
@@ -85,22 +82,25 @@ def format_collection(
     return [prefix + brackets[0], *(f"    {item}," for item in items), brackets[1] + suffix]
 
 
-def assignment(name: str, value: str, *, depth: int = 0) -> list[str]:
-    """Return `name = value`, with parentheses if the value then fits on a line of its own."""
-    line = f"{name} = {value}"
-    max_length = WIDTH - 4 * depth
-    if len(line) > max_length >= len(value) + 4:
-        return [f"{name} = (", f"    {value}", ")"]
-    return [line]
+def assignment(name: str, *parts: str, depth: int = 0) -> list[str]:
+    """Return `name = value`, with parentheses if the value does not fit, unless they do not help.
+
+    Args:
+        name: The name.
+        *parts: Parts of the value, such as `a` and `+ b`, which may be on lines of their own.
+        depth: Indentation of the statement, in steps of four spaces.
+    """
+    value, max_length = " ".join(parts), WIDTH - 4 * depth
+    fits_alone = len(value) + 4 <= max_length
+    if len(f"{name} = {value}") <= max_length or not (fits_alone or parts[1:]):
+        return [f"{name} = {value}"]
+    lines = [value] if fits_alone else parts
+    return [f"{name} = (", *(f"    {line}" for line in lines), ")"]
 
 
-def sum_assignment(name: str, left: str, operator: str, right: str, *, depth: int = 0) -> list[str]:
-    """Return `name = left operator right`, on several lines if necessary."""
-    line, max_length = f"{left} {operator} {right}", WIDTH - 4 * depth
-    if len(f"{name} = {line}") <= max_length:
-        return [f"{name} = {line}"]
-    parts = [line] if len(line) + 4 <= max_length else [left, f"{operator} {right}"]
-    return [f"{name} = (", *(f"    {part}" for part in parts), ")"]
+def path_assignment(name: str, file: str) -> list[str]:
+    """Return a statement with the path of a file in the folder of the configuration."""
+    return assignment(name, "Path(__file__).resolve().parent", f"/ {string_literal(file)}")
 
 
 def comment(text: str, *, depth: int = 0) -> list[str]:

@@ -11,7 +11,6 @@ from terrainkit_robots.onboarding.frameworks.source import (
     float_literal,
     format_collection,
     string_literal,
-    sum_assignment,
 )
 
 
@@ -72,7 +71,7 @@ def test_assignment_is_wrapped():
     value = '"' + "x" * 82 + '"'
     assert assignment("name", value) == ["name = (", f"    {value}", ")"]
     assert assignment("name", value, depth=1) == [f"name = {value}"]
-    assert sum_assignment("a", "b", "+", value) == ["a = (", "    b", f"    + {value}", ")"]
+    assert assignment("a", "b", f"+ {value}") == ["a = (", "    b", f"    + {value}", ")"]
 
 
 def test_comment_prevents_code_injection():
