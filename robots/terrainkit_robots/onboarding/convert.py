@@ -1,6 +1,6 @@
 """The files of an onboarded robot, computed in memory from the facts of its source."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -243,19 +243,17 @@ def _mjcf_text(facts: Facts, spec: RobotSpec, excluded: frozenset[frozenset[str]
     return mjcf_text(merged.model, extras)
 
 
-def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
-    """Return one line if the first keyframe is not the default pose."""
-    defect = keyframe_defect(facts)
-    if not defect:
-        return ()
-    return (
-        f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
-        "a standing pose was solved instead",
-    )
+def _keyframe_changes(facts: Facts) -> Iterator[str]:
+    """Yield one line if the first keyframe is not the default pose."""
+    if defect := keyframe_defect(facts):
+        yield (
+            "the first keyframe is not the default pose: its feet do not carry the robot "
+            f"({defect}); a standing pose was solved instead"
+        )
 
 
-def _replaced_ranges(model: RobotModel) -> tuple[str, ...]:
-    """Return one line if targets of the source differ from the limits of their joints."""
+def _replaced_ranges(model: RobotModel) -> Iterator[str]:
+    """Yield one line if targets of the source differ from the limits of their joints."""
     limits = {joint.name: joint.range for joint in model.joints}
     found = [
         f"{motor.joint} ({motor.targets[0]:.4g} to {motor.targets[1]:.4g})"
@@ -263,23 +261,22 @@ def _replaced_ranges(model: RobotModel) -> tuple[str, ...]:
         if motor.targets and (own := limits.get(motor.joint))
         if not np.allclose(motor.targets, own, atol=1e-3)
     ]
-    if not found:
-        return ()
-    return (f"the limits of the joints replace the ctrlrange of {names(found, max_count=4)}",)
+    if found:
+        yield f"the limits of the joints replace the ctrlrange of {names(found, max_count=4)}"
 
 
-def _held_joints(facts: Facts, spec: RobotSpec) -> tuple[str, ...]:
-    """Return one line if the last joints of legs turn without limits, but are held."""
+def _held_joints(facts: Facts, spec: RobotSpec) -> Iterator[str]:
+    """Yield one line if the last joints of legs turn without limits, but are held."""
     stiffness = spec.per_joint("stiffness")
     ends = [leg.joints[-1] for leg in facts.legs if not leg.limb.has_wheel]
     held = [j.name for j in ends if turns_without_limits(j) and stiffness.get(j.name, 0.0) > 0]
-    if not held:
-        return ()
-    gains = names(f"{gain:g}" for gain in dict.fromkeys(stiffness[name] for name in held))
-    return (
-        f"{names(held, max_count=4)} turn without limits, but are held as ankles by a stiffness of "
-        f"{gains} N m/rad: their collision shapes are not round about their axes, as wheels are",
-    )
+    if held:
+        gains = names(f"{gain:g}" for gain in dict.fromkeys(stiffness[name] for name in held))
+        yield (
+            f"{names(held, max_count=4)} turn without limits, but are held as ankles by a "
+            f"stiffness of {gains} N m/rad: their collision shapes are not round about their axes, "
+            "as wheels are"
+        )
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:

@@ -89,7 +89,8 @@ def statements(result: OnboardResult) -> Iterator[Statement]:
     robot, checks = result.robot, result.verification
     if robot is None or checks is None:
         return
-    yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
+    properties = [" ".join(_sentences(robot)) + "\n"]
+    yield Statement("robot", properties, "wrote", _list_files(robot))
     yield from _comparison(checks)
     yield from _loops(result, robot)
     if checks.standing is not None and (text := result.unjudged):
@@ -109,7 +110,7 @@ def statements(result: OnboardResult) -> Iterator[Statement]:
         edits = names(result.edits)
         text = f"your edits are in {edits}; use --spec to apply the values of a spec"
         yield Statement("changes", (), "backups", text)
-    if num_missing := len(_repairable(report.findings, "MSH")):
+    if num_missing := sum(f.onboarding == "repairs" and f.family == "MSH" for f in report.findings):
         text = "mesh is" if num_missing == 1 else "meshes are"
         text += " missing; set the folder of a package with --package NAME=DIR"
         yield Statement("findings", (), "missing", f"{num_missing} {text}")
@@ -135,7 +136,8 @@ def _findings(result: OnboardResult) -> Iterator[str]:
 
 def _fixes(result: OnboardResult) -> Iterator[Statement]:
     """Yield what was fixed, and the repairs of inertias and mesh paths, which change the robot."""
-    yield Statement("changes", _source(result))
+    file = cell(display_path(result.report.facts.model.file))
+    yield Statement("changes", [f"The source is {file}; it was not changed.\n"])
     if not result.fixed:
         return
     codes = dict.fromkeys(finding.code for finding in result.fixed)
@@ -150,22 +152,12 @@ def _fixes(result: OnboardResult) -> Iterator[Statement]:
             yield Statement("changes", (), "repaired", text)
 
 
-def _source(result: OnboardResult) -> Iterator[str]:
-    file = cell(display_path(result.report.facts.model.file))
-    yield f"The source is {file}; it was not changed.\n"
-
-
 def _fixed(fixed: Sequence[Finding]) -> Iterator[str]:
     rows = []
     for finding in fixed:
         text = finding.message if finding.fix is None else finding.fix.description
         rows.append((finding.code, f"{finding.subject}: {text}" if finding.subject else text))
     return titled_list("Fixed in the written files", rows)
-
-
-def _repairable(findings: Sequence[Finding], family: str) -> list[str]:
-    """Return the subjects of the findings that onboarding can repair."""
-    return [f.subject for f in findings if f.onboarding == "repairs" and f.family == family]
 
 
 # Convert
@@ -177,10 +169,6 @@ def _list_files(robot: RobotFiles) -> str:
     size = sum(map(len, meshes)) / 1e6
     more = f", {count(len(meshes), 'mesh file')} ({size:.1f} MB)" if meshes else ""
     return f"{names(texts)}{more}"
-
-
-def _properties(robot: RobotFiles) -> Iterator[str]:
-    yield " ".join(_sentences(robot)) + "\n"
 
 
 def _sentences(robot: RobotFiles) -> Iterator[str]:
