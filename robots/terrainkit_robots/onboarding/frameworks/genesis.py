@@ -43,17 +43,7 @@ def _about(robot: ConfigRobot) -> list[str]:
         f"{robot.title} for Genesis: entity, gains and default pose.",
         source.GENERATED_NOTE,
         f"Copy the folder into your Python package as {package}, and use",
-        "\n".join(
-            [
-                "    import genesis as gs",
-                f"    from {package}.genesis_config import build",
-                "",
-                "    gs.init()",
-                "    scene = gs.Scene()",
-                "    scene.add_entity(gs.morphs.Plane())",
-                "    robot = build(scene, n_envs=4096)",
-            ]
-        ),
+        "\n".join(source.fill("genesis_use", package=package)),
         "Genesis has its own joint order: index DOFs by `dofs(robot)`, which follows the order of "
         "JOINTS.",
     ]

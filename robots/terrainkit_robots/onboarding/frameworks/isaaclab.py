@@ -33,19 +33,6 @@ _MIN_MOTOR_FEET = 4
 _MAX_PART_LENGTH = 20
 """Longest name of an actuator that is made of the names of its joints."""
 
-_TASK_IMPORTS = [
-    "from isaaclab.utils import configclass",
-    "",
-    "try:",
-    "    from isaaclab_tasks.core.velocity import velocity_env_cfg",
-    "",
-    "    IS_ISAACLAB_3 = True",
-    "except ModuleNotFoundError:  # Isaac Lab 2",
-    "    from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
-    "",
-    "    IS_ISAACLAB_3 = False",
-]
-
 
 def config_text(robot: ConfigRobot) -> str:
     """Return the text of `isaaclab_config.py`.
@@ -63,7 +50,7 @@ def config_text(robot: ConfigRobot) -> str:
         "isaaclab_config",
         about=source.docstring(_about(robot, name, is_legged)),
         kinds=", ".join(sorted(set(actuators.values()))),
-        task_imports=_TASK_IMPORTS if is_legged else [],
+        task_imports=source.fill("isaaclab_imports") if is_legged else [],
         urdf=source.path_assignment("ROBOT_URDF", spec.urdf),
         name=name,
         fix_base=str(not spec.floating),
@@ -221,13 +208,7 @@ def _actions(robot: ConfigRobot) -> list[str]:
             else "self.actions.joint_pos = None"
         ]
     if robot.velocity_joints:
-        lines += [
-            "self.actions.joint_vel = velocity_env_cfg.mdp.JointVelocityActionCfg(",
-            '    asset_name="robot",',
-            "    joint_names=WHEELS,",
-            "    scale=SPEED_SCALE,",
-            ")",
-        ]
+        lines += source.fill("isaaclab_wheels")
     return lines
 
 

@@ -29,9 +29,7 @@ def config_text(robot: ConfigRobot) -> str:
     config = source.fill(
         "legged_gym_config",
         about=source.docstring(_about(robot, name)),
-        before_imports=legged_robot.BEFORE_IMPORTS,
         wheel_imports=_IMPORTS if has_wheels else [],
-        here=legged_robot.HERE,
         speed_scale=legged_robot.speed_scale(robot),
         wheels=["", "", *wheels] if has_wheels else [],
         name=name,
@@ -88,7 +86,7 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *legged_robot.path_in_folder("file", robot.spec.urdf),
         legged_robot.asset_name(robot),
         *legged_robot.contacts(robot),
-        *legged_robot.shapes(),
+        *source.fill("legged_robot_shapes"),
         *robot.provenance_comment("armature", depth=2),
         *difference,
         f"armature = {source.float_literal(armature)}",

@@ -1,4 +1,7 @@
-"""Write the parts of configurations that legged_gym and LeggedGym-Ex have in common."""
+"""Write the parts of configurations that legged_gym and LeggedGym-Ex have in common.
+
+Their templates ignore RUF012, which is about mutable class attributes.
+"""
 
 from collections.abc import Sequence
 
@@ -13,15 +16,6 @@ from terrainkit_robots.onboarding.frameworks.substrings import (
     keys_for,
 )
 from terrainkit_robots.text import group, names
-
-BEFORE_IMPORTS = ["# ruff: noqa: RUF012", "", "from pathlib import Path", ""]
-"""The first lines of a configuration. RUF012 is about mutable class attributes."""
-
-HERE = [
-    "# Braces are doubled, since the framework applies str.format to the path.",
-    'HERE = str(Path(__file__).resolve().parent).replace("{", "{{").replace("}", "}}")',
-]
-"""The statement that finds the folder of the configuration."""
 
 
 def check_legs(robot: ConfigRobot, name: str, others: Sequence[str]) -> None:
@@ -140,19 +134,6 @@ def contacts(robot: ConfigRobot) -> list[str]:
         *source.assignment("foot_name", source.string_literal(foot_name), depth=2),
         *_body_keys(robot, "penalized_contacts", "penalize_contacts_on"),
         *_body_keys(robot, "termination_contacts", "terminate_after_contacts_on"),
-    ]
-
-
-def shapes() -> list[str]:
-    """Return the options with which Isaac Gym reads robot.urdf."""
-    return [
-        "# 1 disables them: URDF cannot exclude contacts between overlapping bodies.",
-        "self_collisions = 1",
-        "# Feet on fixed joints with dont_collapse remain separate bodies.",
-        "collapse_fixed_joints = True",
-        "# Heights are measured with the original shapes, and meshes have z up.",
-        "replace_cylinder_with_capsule = False",
-        "flip_visual_attachments = False",
     ]
 
 

@@ -69,8 +69,6 @@ def config_text(robot: ConfigRobot) -> str:
     config = source.fill(
         "leggedgym_ex_config",
         about=source.docstring(_about(robot)),
-        before_imports=legged_robot.BEFORE_IMPORTS,
-        here=legged_robot.HERE,
         name=class_name(robot.spec.name),
         package=package,
         num_observations=str(num_observations),
@@ -190,5 +188,5 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *source.format_collection("dof_vel_limits = ", limits, depth=2),
         *source.comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
         *source.format_collection("links_to_keep = ", source.format_strings(spec.feet), depth=2),
-        *legged_robot.shapes(),
+        *source.fill("legged_robot_shapes"),
     ]

@@ -64,7 +64,7 @@ def config_text(robot: ConfigRobot) -> str:
         about=source.docstring(_about(robot, has_task=has_task)),
         standard=_STANDARD_IMPORTS if has_task else [],
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
-        task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
+        task_imports=source.fill("mjlab_imports") if has_task else [],
         robot_xml=source.path_assignment("ROBOT_XML", robot.spec.mjcf),
         init_state=initial_state(robot, patterns, depth=1),
         articulation=_articulation(robot, patterns),

@@ -13,17 +13,6 @@ from terrainkit_robots.onboarding.frameworks.patterns import (
 )
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-IMPORTS = """\
-from mjlab.envs import ManagerBasedRlEnvCfg
-from mjlab.managers import RewardTermCfg, TerminationTermCfg
-from mjlab.sensor import ContactMatch, ContactSensorCfg, ObjRef, RingPatternCfg
-from mjlab.tasks.registry import register_mjlab_task
-from mjlab.tasks.velocity import mdp
-from mjlab.tasks.velocity.config.go1.rl_cfg import unitree_go1_ppo_runner_cfg
-from mjlab.tasks.velocity.rl import VelocityOnPolicyRunner
-from mjlab.tasks.velocity.velocity_env_cfg import make_velocity_env_cfg"""
-"""Imports of the task."""
-
 _POSE_STD = {
     "hip": (0.3, 0.5),
     "knee": (0.5, 0.8),
@@ -47,14 +36,6 @@ _POSITION_ACTIONS = 'cfg.actions["joint_pos"].scale = ACTION_SCALE'
 _NAMED_POSITION_ACTIONS = 'cfg.actions["joint_pos"].actuator_names = tuple(ACTION_SCALE)'
 
 _NO_POSITION_ACTIONS = 'del cfg.actions["joint_pos"]'
-
-_VELOCITY_ACTIONS = [
-    'cfg.actions["joint_vel"] = mdp.JointVelocityActionCfg(',
-    '    entity_name="robot",',
-    "    actuator_names=tuple(SPEED_SCALE),",
-    "    scale=SPEED_SCALE,",
-    ")",
-]
 
 
 def task_id(spec: RobotSpec, terrain: str) -> str:
@@ -120,7 +101,7 @@ def _pose_std(robot: ConfigRobot, name: str, index: int) -> list[str]:
 
 def _actions(robot: ConfigRobot) -> list[str]:
     """Return the source of the actions with position targets and velocity targets."""
-    velocity = _VELOCITY_ACTIONS if robot.velocity_joints else []
+    velocity = source.fill("mjlab_wheels") if robot.velocity_joints else []
     if not robot.position_joints:
         return [_NO_POSITION_ACTIONS, *velocity]
     return [_POSITION_ACTIONS, *([_NAMED_POSITION_ACTIONS] if velocity else []), *velocity]
