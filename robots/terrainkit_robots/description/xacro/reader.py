@@ -5,11 +5,10 @@ recurse. The child process (see `process`) has limits on time and memory and ret
 not required: `PackageResolver` finds packages.
 """
 
-import dataclasses
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,17 +41,6 @@ class XacroError(TerrainkitError):
         """File and line of the element that failed, if known."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Expansion:
-    """An expanded xacro file."""
-
-    data: bytes
-    """The URDF; each element has its origin, for `pop_origin`."""
-
-    files: tuple[Path, ...]
-    """The xacro file and all files that it includes."""
-
-
 def expand_xacro(
     file: Path,
     arguments: Mapping[str, str],
@@ -60,7 +48,7 @@ def expand_xacro(
     *,
     timeout: float = MAX_SECONDS,
     max_memory: int = _MAX_BYTES,
-) -> Expansion:
+) -> tuple[bytes, tuple[Path, ...]]:
     """Expand a xacro file.
 
     Args:
@@ -69,6 +57,10 @@ def expand_xacro(
         packages: Folders of ROS packages by name.
         timeout: Time limit [s].
         max_memory: Memory limit [bytes], where the operating system supports it.
+
+    Returns:
+        The URDF, whose elements have their origin, for `pop_origin`; and the xacro file and all
+        files that it includes.
 
     Raises:
         XacroError: If the file cannot be expanded within the limits.
@@ -93,7 +85,7 @@ def expand_xacro(
         raise XacroError(f"xacro: cannot be expanded: {error}; {hint}") from None
     if message:
         raise XacroError(truncate(one_line(message), 1000), place)
-    return Expansion(data=xml, files=files)
+    return xml, files
 
 
 def pop_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:
@@ -126,29 +118,29 @@ def read_xacro(
         name="", kind="xacro", file=doc.file, source=file_source, sources=(doc.file,)
     )
     if doc.problems:  # the expansion would only repeat them
-        return dataclasses.replace(model, problems=doc.problems)
+        return replace(model, problems=doc.problems)
     try:
-        expansion = expand_xacro(doc.file, arguments, packages)
+        data, included = expand_xacro(doc.file, arguments, packages)
     except XacroError as error:
         source = file_source
         if error.location is not None:
             file, line = error.location
             source = Source(file=_as_given(file, doc.file), line=line)
         problem = Problem(code="XML005", message=str(error), source=source)
-        return dataclasses.replace(model, problems=(problem,))
-    expanded = parse_xml(doc.file, expansion.data)
+        return replace(model, problems=(problem,))
+    expanded = parse_xml(doc.file, data)
     if expanded.root is None:
-        return dataclasses.replace(model, problems=expanded.problems)
+        return replace(model, problems=expanded.problems)
     sources = {}
     source = file_source
     for element in expanded.root.iter(etree.Element):
-        origin = pop_origin(element, expansion.files)
+        origin = pop_origin(element, included)
         if origin is not None:  # otherwise, the location of the previous element
             source = Source(file=_as_given(origin[0], doc.file), line=origin[1])
         sources[element] = source
-    model = read_urdf(dataclasses.replace(expanded, sources=sources), packages=packages)
-    files = tuple(_as_given(file, doc.file) for file in expansion.files)
-    return dataclasses.replace(model, kind="xacro", sources=files)
+    model = read_urdf(replace(expanded, sources=sources), packages=packages)
+    files = tuple(_as_given(file, doc.file) for file in included)
+    return replace(model, kind="xacro", sources=files)
 
 
 def _as_given(file: Path, main: Path) -> Path:

@@ -150,7 +150,7 @@ def test_code_in_robot_folder_is_not_run(tmp_path, monkeypatch):
     for name in ("json", "yaml", "xacro", "xml", "sitecustomize"):
         (file.parent / f"{name}.py").write_text("raise SystemExit('run')")
     monkeypatch.chdir(file.parent)
-    assert b'name="a"' in expand_xacro(Path(file.name), {}, {}).data
+    assert b'name="a"' in expand_xacro(Path(file.name), {}, {})[0]
     robot = load_robot(Path(file.name))
     assert robot.file == robot.links[0].source.file == Path(file.name)
 
