@@ -12,6 +12,8 @@ import numpy as np
 from terrainkit_robots.description.model import MeshFile
 from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.files import open_regular
+from terrainkit_robots.mesh.hull import convex_hull, reduce_hull
+from terrainkit_robots.mesh.reader import STL_FORMATS, read_mesh
 from terrainkit_robots.mesh.sniff import (
     STL_FACE,
     STL_HEADER,
@@ -136,8 +138,6 @@ class Meshes:
         Raises:
             MeshError: If the file cannot be read.
         """
-        from terrainkit_robots.mesh.reader import STL_FORMATS
-
         surface = self.surface(path)
         is_stl = self.header(path).format in STL_FORMATS
         return surface.faces.ravel() if is_stl else np.arange(len(surface.points))
@@ -238,7 +238,6 @@ class Meshes:
         Raises:
             MeshError: If the file cannot be read or the mesh is flat.
         """
-        from terrainkit_robots.mesh.hull import convex_hull, reduce_hull
 
         def make() -> Surface:
             if max_vertices is not None:
@@ -289,8 +288,6 @@ class Meshes:
         return result
 
     def _read(self, path: Path) -> Surface:
-        from terrainkit_robots.mesh.reader import read_mesh
-
         header = self.header(path)
         if header.problem:
             raise MeshError(header.problem)

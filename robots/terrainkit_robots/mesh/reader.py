@@ -8,6 +8,7 @@ from io import BytesIO
 import numpy as np
 
 from terrainkit_robots.mesh.collada import read_dae
+from terrainkit_robots.mesh.hull import convex_hull
 from terrainkit_robots.mesh.sniff import STL_FACE, STL_HEADER, Format
 from terrainkit_robots.mesh.surface import (
     STL_RECORD,
@@ -128,8 +129,6 @@ def _msh(data: bytes) -> Surface:
 
 def _hull_of_points(points: Points) -> Surface:
     """Return the convex hull, which MuJoCo uses for meshes without faces."""
-    from terrainkit_robots.mesh.hull import convex_hull
-
     if not np.isfinite(points).all():
         raise MeshError("has vertices that are not finite")
     return convex_hull(unique_points(points)[0])
