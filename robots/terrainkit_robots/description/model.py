@@ -69,10 +69,6 @@ class Problem:
     """The edits that correct it, if it can be corrected automatically."""
 
 
-def _identity() -> Matrix:
-    return np.eye(4)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Inertial:
     """Mass and inertia of a link, as declared."""
@@ -82,7 +78,7 @@ class Inertial:
     mass: float | None
     """Mass [kg]. None if missing or not a number; NaN if MuJoCo computes it from a mesh."""
 
-    origin: Matrix = field(default_factory=_identity)
+    origin: Matrix = field(default_factory=lambda: np.eye(4))
     """Frame of the center of mass and of the inertia in the link frame, shape (4, 4) [m]."""
 
     inertia: Matrix | None = None
@@ -152,7 +148,7 @@ class Geometry:
     size_source: Source | None = None
     """Element that holds the size, if it is not `source`."""
 
-    origin: Matrix = field(default_factory=_identity)
+    origin: Matrix = field(default_factory=lambda: np.eye(4))
     """Pose in the link frame, shape (4, 4) [m]."""
 
     mesh: MeshFile | None = None
@@ -362,7 +358,7 @@ class Joint:
     child: str
     """Name of the child link; empty if missing."""
 
-    origin: Matrix = field(default_factory=_identity)
+    origin: Matrix = field(default_factory=lambda: np.eye(4))
     """Pose of the child frame in the parent frame at position `reference`, shape (4, 4) [m]."""
 
     axis: Matrix | None = None
