@@ -69,7 +69,6 @@ def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None)
         doc: The XML document.
         contents: File contents by path, which are used instead of included files on disk.
     """
-    assert doc.root is not None
     mjcf = read_tree(doc, contents or {})
     spec, lines = parse_mjcf(mjcf)
     model = RobotModel(

@@ -178,7 +178,7 @@ def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
         doc: The main file; it has a root element.
         contents: File contents by path, which are used instead of the files on disk.
     """
-    root = Node(tag="", source=doc.source(_root(doc)), folder=doc.file.parent)
+    root = Node(tag="", source=doc.source(doc.required_root), folder=doc.file.parent)
     mjcf = MjcfTree(root=root, problems=list(doc.problems))
     reader = _TreeReader(mjcf, contents)
     mjcf.root = reader.tree(doc)
@@ -222,8 +222,10 @@ class _TreeReader:
         self._mjcf.sources.append(main.file)
         folder = main.file.parent
         included: dict[Path, tuple[Path, ...]] = {main.file: ()}
-        top = Node(tag="", source=main.source(_root(main)), folder=folder)
-        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(_root(main), main, top, 0)]
+        top = Node(tag="", source=main.source(main.required_root), folder=folder)
+        stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [
+            (main.required_root, main, top, 0)
+        ]
         while stack and self._count <= MAX_ELEMENTS:
             element, doc, parent, depth = stack.pop()
             source = doc.source(element)
@@ -233,7 +235,7 @@ class _TreeReader:
             try:
                 if element.tag == "include":
                     part = self._load_include(element, doc, folder, included)
-                    inner = _root(part).iterchildren(etree.Element, reversed=True)
+                    inner = part.required_root.iterchildren(etree.Element, reversed=True)
                     stack += [(child, part, parent, depth) for child in inner]
                     continue
                 node = self._node(element, source, parent, folder)
@@ -309,7 +311,7 @@ class _TreeReader:
         part = self._read(path, name, "include")
         included[path] = chain
         self._mjcf.sources.append(path)
-        if not len(_root(part)):
+        if not len(part.required_root):
             raise RobotFileError(f"{name} is empty; expected elements to include")
         return part
 
@@ -349,7 +351,7 @@ class _TreeReader:
         if name and _real_path(path) in map(_real_path, parents):
             raise RobotFileError(f"{name} attaches itself")
         part = self._read(path, name, "model")
-        tag = _root(part).tag
+        tag = part.required_root.tag
         if tag != "mujoco":
             raise RobotFileError(f"root element of {name}: got <{tag}>; expected <mujoco>")
         key = f"attached_{len(self._mjcf.attached)}.xml"
@@ -361,11 +363,6 @@ class _TreeReader:
         self._mjcf.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
-
-
-def _root(doc: XmlDocument) -> "etree._Element":
-    assert doc.root is not None
-    return doc.root
 
 
 def _prefixed_name(name: str, element: "etree._Element") -> str:

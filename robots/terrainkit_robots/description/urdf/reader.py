@@ -87,8 +87,7 @@ class _Reader:
 
     def robot(self) -> RobotModel:
         """Return the robot."""
-        root = self._doc.root
-        assert root is not None
+        root = self._doc.required_root
         source = self._doc.source(root)
         if not root.get("name", "").strip():
             fix = _name_fix(source, self._doc.file.stem)

@@ -53,9 +53,8 @@ def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
 
     They are names of no link or joint, joints with two transmissions, and invalid ratios.
     """
-    assert doc.root is not None
     links, joints = (
-        {element.get("name", "") for element in doc.root.iterchildren(tag)}
+        {element.get("name", "") for element in doc.required_root.iterchildren(tag)}
         for tag in ("link", "joint")
     )
     yield from _unknown_names(doc, links, joints)
@@ -67,8 +66,7 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
     """Yield a problem for each name that is not in `links` or `joints`."""
     known = {"link": links, "joint": joints, "link or joint": links | joints}
     found: dict[str, Problem] = {}
-    assert doc.root is not None
-    references = list(_references(doc.root))
+    references = list(_references(doc.required_root))
     used: dict[str, set[str]] = {place: set() for _, place, _, _ in references}
     for _, place, _, name in references:
         used[place].add(name)
@@ -121,9 +119,8 @@ def _driven_joint(transmission: etree._Element) -> str:
 
 def _repeated_transmissions(doc: XmlDocument, joints: set[str]) -> Iterator[Problem]:
     """Yield a problem for each joint that two simple transmissions drive."""
-    assert doc.root is not None
     seen: set[str] = set()
-    for element in doc.root.iterchildren("transmission"):
+    for element in doc.required_root.iterchildren("transmission"):
         if "SimpleTransmission" not in (element.get("type") or element.findtext("type") or ""):
             continue
         name = _driven_joint(element)
@@ -141,8 +138,7 @@ def _repeated_transmissions(doc: XmlDocument, joints: set[str]) -> Iterator[Prob
 
 def _invalid_reductions(doc: XmlDocument) -> Iterator[Problem]:
     """Yield a problem for each ratio of a transmission that is 0 or not a number."""
-    assert doc.root is not None
-    for reduction in doc.root.iterfind("transmission//mechanicalReduction"):
+    for reduction in doc.required_root.iterfind("transmission//mechanicalReduction"):
         text = (reduction.text or "").strip()
         ratio = parse_numbers(text, 1)
         if (ratio is None or ratio[0] == 0) and not has_variable(text):

@@ -67,6 +67,12 @@ class XmlDocument:
 
     problems: tuple[Problem, ...] = ()
 
+    @property
+    def required_root(self) -> "etree._Element":
+        """The root element of a document that was parsed."""
+        assert self.root is not None
+        return self.root
+
     def source(self, element: "etree._Element") -> Source:
         """Return the location of an element."""
         return self.sources[element]
