@@ -171,15 +171,15 @@ def _add_boxes(base: Any, model: Any) -> None:
     Boxes, since flat meshes have no convex hull.
     """
     solid = set(model.geom_bodyid[collides(model)].tolist())
-    for geom in base.find_all("geom"):
-        if geom.parent.id in solid:
-            continue
-        center, size = np.split(model.geom_aabb[geom.id], 2)
-        quat, position = model.geom_quat[geom.id], np.zeros(3)
+    geoms = [geom for geom in base.find_all("geom") if geom.parent.id not in solid]
+    # A new geom changes the numbers of the others.
+    for body, index in [(geom.parent, geom.id) for geom in geoms]:
+        center, size = np.split(model.geom_aabb[index], 2)
+        quat, position = model.geom_quat[index], np.zeros(3)
         mujoco.mju_rotVecQuat(position, center, quat)
-        geom.parent.add_geom(
+        body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=position + model.geom_pos[geom.id],
+            pos=position + model.geom_pos[index],
             quat=quat,
             size=np.maximum(size, 1e-3),
             mass=0,

@@ -60,7 +60,7 @@ def test_bodies_without_collision_shapes_touch_the_ground_alone(quadruped, nomin
             geom.contype = geom.conaffinity = 0
     (tmp_path / quadruped.mjcf.name).write_text(mjspec.to_xml())
     (tmp_path / "robot.toml").write_text(quadruped.spec.to_toml())
-    robot, touching, masses = Robot.load(tmp_path), [], []
+    robot, touching, masses, counts = Robot.load(tmp_path), [], [], []
     for visual_collisions in (False, True):
         asset = Asset(visual_collisions=visual_collisions, self_collisions=True)
         scene = Scene(robot, Plane(), nominal_task(asset=asset))
@@ -72,9 +72,13 @@ def test_bodies_without_collision_shapes_touch_the_ground_alone(quadruped, nomin
         assert all("world" in pair for pair in names)
         touching.append(set().union(*names) - {"world"})
         masses.append(scene.model.body_mass.sum())
+        counts.append(np.bincount(scene.model.geom_bodyid[scene.geoms]).tolist())
     assert touching[0] == set(robot.spec.feet)
     assert touching[1] > {robot.spec.base, *robot.spec.feet}
     assert masses[0] == masses[1]
+    visual = np.bincount(scene.model.geom_bodyid[scene.model.geom_conaffinity == 0])
+    expected = [before or shown for before, shown in zip(counts[0], visual.tolist(), strict=True)]
+    assert counts[1] == expected  # a box for each visual geom of the other bodies
 
 
 def test_sites_of_feet_are_at_the_geoms_that_touch_the_ground(scene_of, cart, tmp_path):
