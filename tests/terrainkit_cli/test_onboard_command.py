@@ -101,7 +101,7 @@ def test_onboard_warns_of_failed_standing_test(here, tmp_path, monkeypatch):
     def fail(*_arguments, **_options):
         raise CannotCheckError("300 contacts at once")
 
-    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_test", fail)
+    monkeypatch.setattr("terrainkit_robots.onboarding.verify.stand_test", fail)
     code, _, err = here("quadruped", NO_PICTURES)
     assert code == 0
     assert "warning: quadruped: the robot does not stand: it could not be simulated" in err

@@ -260,7 +260,7 @@ def test_onboard_reports_failed_gain_derivation(tmp_path, monkeypatch):
 
 
 def test_onboard_reports_failed_standing_test(tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_test", cannot_check("why"))
+    monkeypatch.setattr("terrainkit_robots.onboarding.verify.stand_test", cannot_check("why"))
     result = onboard(QUADRUPED, tmp_path / "robot", options())
     checks = result.verification
     assert (checks.standing, checks.is_stable) == (None, False)
