@@ -205,9 +205,13 @@ class Facts:
         """Return the nearest ancestor of a body that is not virtual."""
         return physical_parent(self.bodies, body)
 
+    @cached_property
+    def _parents(self) -> frozenset[int | None]:
+        return frozenset(body.parent for body in self.bodies)
+
     def is_wheel(self, body: Body) -> bool:
         """Return whether a body is a wheel or a propeller."""
-        is_end = all(other.parent != body.index for other in self.bodies)
+        is_end = body.index not in self._parents
         return (is_end and is_balanced(body)) or body.index in self.wheels
 
     @cached_property

@@ -55,9 +55,21 @@ class Crossing:
     """
 
     def __init__(
-        self, spec: PolicySpec, terrain_map: TerrainMap, num_envs: int, config: EvaluationConfig
+        self,
+        spec: PolicySpec,
+        terrain_map: TerrainMap,
+        num_envs: int,
+        config: EvaluationConfig,
+        scale: float = 1.0,
     ) -> None:
         """Load a policy onto a map.
+
+        Args:
+            spec: The policy, such as a run.
+            terrain_map: The map.
+            num_envs: Robots that walk at once.
+            config: Seed and device.
+            scale: Factor of the offset of the starts and of the radius of the goals.
 
         Raises:
             ConfigError: if a run has no policy, or its policy is for another robot, or its task
@@ -70,7 +82,7 @@ class Crossing:
             got = f"got lin_vel_x {list(commands.lin_vel_x)}, ang_vel_yaw "
             got += f"{list(commands.ang_vel_yaw)}"
             raise ConfigError(f"commands: {got}; expected a task to walk ahead and turn both ways")
-        start = replace(spec.task.init_state, position=START_OFFSET, yaw=START_YAW)
+        start = replace(spec.task.init_state, position=scale * START_OFFSET, yaw=START_YAW)
         asset = replace(spec.task.asset, visual_collisions=True)
         spec = replace(spec, task=replace(spec.task, init_state=start, asset=asset))
         collision = spec.task.terrain.collision
@@ -78,6 +90,7 @@ class Crossing:
         config = replace(config, seconds=3600.0)  # episodes have no time-out; attempts do
         self._map, self._env = terrain_map, build_eval_env(spec, terrain, num_envs, config)
         self._policy = load_policy(spec, self._env)
+        self._goal_radius = scale * GOAL_RADIUS
 
     @single_torch_thread()
     def attempt(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> Attempts:
@@ -92,9 +105,10 @@ class Crossing:
         env.set_commands(None)
         env.reset()
         if reset := getattr(self._policy, "reset", None):  # a network with the last attempt's state
-            reset(torch.ones(env.num_envs, dtype=torch.bool))
+            with torch.inference_mode():
+                reset(torch.ones(env.num_envs, dtype=torch.bool))
         patches = [self._map.patch(*place) for place in zip(levels, columns, strict=True)]
-        progress = _Progress(env, patches, self.speed)
+        progress = _Progress(env, patches, self.speed, self._goal_radius)
         for _, fell in rollout(env, self._policy, progress.schedule()):
             progress.update(fell)
         return Attempts(outcomes=progress.outcomes, seconds=progress.seconds)
@@ -103,7 +117,9 @@ class Crossing:
 class _Progress:
     """The progress of the robots on their patches."""
 
-    def __init__(self, env: LeggedEnv, patches: list[Patch], speed: float) -> None:
+    def __init__(
+        self, env: LeggedEnv, patches: list[Patch], speed: float, radius: float = GOAL_RADIUS
+    ) -> None:
         n = len(patches)
         self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
         self._env = env
@@ -119,7 +135,7 @@ class _Progress:
         goals = np.full((n, max(map(len, routes)), 2), np.nan)
         for robot, route in enumerate(routes):
             goals[robot, : len(route)] = route
-        self._waypoints = Waypoints.make(n, goals.shape[1], GOAL_RADIUS)
+        self._waypoints = Waypoints.make(n, goals.shape[1], radius)
         self._waypoints.reset(np.arange(n), goals)
         self._speed = speed
         self._lower = np.array([patch.grid.lower for patch in patches])

@@ -261,7 +261,8 @@ def measure_limits(
         seed = config.seed + number
         # A map of these patches alone: the time of a step grows with the number of solids.
         terrain_map = _generate(limits_config(tests, asked, seed, cell))
-        crossing = Crossing(spec, terrain_map, len(columns), replace(config, seed=seed))
+        start = replace(config, seed=seed)
+        crossing = Crossing(spec, terrain_map, len(columns), start, cell / CELL)
         outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
         counted = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
         grid = terrain_map.config.patch_grid(0, 0)

@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="the extra `train` is not installed")
+torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig
@@ -128,16 +128,16 @@ def test_a_bar_stops_a_robot_of_which_only_the_feet_collide(tmp_path):
 
 def test_every_attempt_starts_with_the_initial_state_of_a_recurrent_policy():
     class Statue:
-        steps = 0
+        state = torch.zeros(1)
         seen = ()
 
         def __call__(self, obs):
-            self.seen = (*self.seen, self.steps)
-            self.steps += 1
+            self.seen = (*self.seen, int(self.state))
+            self.state = self.state + 1
             return np.zeros((len(obs), 12))
 
         def reset(self, dones):
-            self.steps *= not dones.all()
+            self.state[dones] = 0  # in place, as in rsl_rl
 
     policy = Statue()
     terrains = (SubTerrain(terrain="flat"),)

@@ -37,7 +37,8 @@ def measure(monkeypatch):
 
     def run(highest, limits=LIMITS, lapse=0):
         class Known:
-            def __init__(self, _, terrain_map, num_envs, config):
+            def __init__(self, _, terrain_map, num_envs, config, scale):
+                assert scale == 1.0
                 assert terrain_map.difficulty.shape == (1, len(highest))
                 seeds.append(config.seed)
                 self.num_envs, self.hardness = num_envs, []

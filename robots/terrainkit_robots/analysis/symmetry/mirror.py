@@ -219,7 +219,9 @@ def _pairs_by_position(
     bodies: Sequence[Body], mirror: Mirror, points: Matrix, tolerance: float
 ) -> Iterator[tuple[int, int]]:
     """Yield pairs of bodies at mirrored positions, for each body the closest first."""
-    levels = [len(ancestors(bodies, body.index)) for body in bodies]
+    levels: list[int] = []
+    for body in bodies:
+        levels.append(0 if body.parent is None else levels[body.parent] + 1)
     images = mirror.image(points)
     lateral = np.abs(points @ mirror.normal) > max(tolerance, 1e-3)
     for body in bodies[1:]:
