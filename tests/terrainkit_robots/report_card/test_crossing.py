@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
+pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig
@@ -127,6 +127,8 @@ def test_a_bar_stops_a_robot_of_which_only_the_feet_collide(tmp_path):
 
 
 def test_every_attempt_starts_with_the_initial_state_of_a_recurrent_policy():
+    torch = pytest.importorskip("torch")
+
     class Statue:
         state = torch.zeros(1)
         seen = ()
