@@ -10,7 +10,7 @@ The public names are those of `__init__.pyi`, imported on first use: a robot nee
 
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def __getattr__(name: str) -> Any:
