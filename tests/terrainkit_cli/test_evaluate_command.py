@@ -235,7 +235,7 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
             counts=((0.1, 9, 10), (0.14, 3, 20)),
             robot_limit=0.1792,
         )
-        about = {"robot": "hare", "checkpoint": "hare.onnx", "repetitions": 10, "seed": 1}
+        about = {"robot": "hare", "checkpoint": "hare.onnx", "leg_length": 0.5}
         return ResultTable(about=about, tables={"limits": (result,)})
 
     monkeypatch.setattr(policy_limits, "measure_limits", measure)
@@ -243,10 +243,10 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
     told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each round\n"
     assert (code, err) == (0, told)
     assert out.splitlines() == [
-        "test    90 % cross               50 % cross              crossed"
+        "test    90 % cross               50 % cross              in legs     crossed"
         "                     limit of the robot",
-        "stairs  10.0 cm (< 2.0 to 11.0)  13.0 cm (12.0 to 14.0)  9/10 at 10.0, 3/20 at 14.0"
-        "  17.9 cm",
+        "stairs  10.0 cm (< 2.0 to 11.0)  13.0 cm (12.0 to 14.0)  0.20, 0.26"
+        "  9/10 at 10.0, 3/20 at 14.0  17.9 cm",
         "",
         "wrote limits.json",
     ]

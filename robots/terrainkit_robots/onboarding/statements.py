@@ -89,8 +89,7 @@ def statements(result: OnboardResult) -> Iterator[Statement]:
     robot, checks = result.robot, result.verification
     if robot is None or checks is None:
         return
-    properties = [" ".join(_sentences(robot)) + "\n"]
-    yield Statement("robot", properties, "wrote", _list_files(robot))
+    yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
     yield from _comparison(checks)
     yield from _loops(result, robot)
     if checks.standing is not None and (text := result.unjudged):
@@ -136,8 +135,7 @@ def _findings(result: OnboardResult) -> Iterator[str]:
 
 def _fixes(result: OnboardResult) -> Iterator[Statement]:
     """Yield what was fixed, and the repairs of inertias and mesh paths, which change the robot."""
-    file = cell(display_path(result.report.facts.model.file))
-    yield Statement("changes", [f"The source is {file}; it was not changed.\n"])
+    yield Statement("changes", _source(result))
     if not result.fixed:
         return
     codes = dict.fromkeys(finding.code for finding in result.fixed)
@@ -150,6 +148,11 @@ def _fixes(result: OnboardResult) -> Iterator[Statement]:
             more = f"; {len(texts) - 3} more" if texts[3:] else ""
             text = f"{'; '.join(texts[:3])}{more}; see report.md"
             yield Statement("changes", (), "repaired", text)
+
+
+def _source(result: OnboardResult) -> Iterator[str]:
+    file = cell(display_path(result.report.facts.model.file))
+    yield f"The source is {file}; it was not changed.\n"
 
 
 def _fixed(fixed: Sequence[Finding]) -> Iterator[str]:
@@ -169,6 +172,10 @@ def _list_files(robot: RobotFiles) -> str:
     size = sum(map(len, meshes)) / 1e6
     more = f", {count(len(meshes), 'mesh file')} ({size:.1f} MB)" if meshes else ""
     return f"{names(texts)}{more}"
+
+
+def _properties(robot: RobotFiles) -> Iterator[str]:
+    yield " ".join(_sentences(robot)) + "\n"
 
 
 def _sentences(robot: RobotFiles) -> Iterator[str]:

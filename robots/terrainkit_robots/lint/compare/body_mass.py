@@ -72,7 +72,7 @@ def relative_difference(a: float | Matrix, b: float | Matrix) -> float:
     Of two arrays, this is the largest difference relative to the largest number.
     """
     largest = float(max(np.abs(a).max(), np.abs(b).max()))
-    return float(np.abs(a - b).max()) / largest if largest > 0 else 0.0
+    return float(np.abs(a - b).max()) / largest if largest != 0 else 0.0
 
 
 def _center(body: Body, frame: Matrix) -> Matrix:
