@@ -292,8 +292,10 @@ def _names_on_disk(path: Path, count: int) -> list[str]:
 def _listed_name(folder: Path, name: str) -> str | None:
     """Return a name in a folder, or the only one that differs in letter case, or None."""
     entries = _list_names(folder)
+    if name in entries:
+        return name
     matches = [entry for entry in entries if entry.lower() == name.lower()]
-    return name if name in entries else matches[0] if len(matches) == 1 else None
+    return matches[0] if len(matches) == 1 else None
 
 
 def exists(path: Path) -> bool:

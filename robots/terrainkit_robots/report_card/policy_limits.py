@@ -122,25 +122,20 @@ def limit_tests(limits: RobotLimits, cell: float = CELL) -> tuple[LimitTest, ...
     fewest, most = (round(share * limits.gap / cell) for share in (0.1, 2))
     gaps = (cell * max(fewest, 1), cell * min(max(most, 2), 40))
     # A robot starts and ends on flat ground, and only the tested quantity changes.
-    ramps = {"gap": 0.0, "offset": 0.0}
-    ramps |= lengths(start=1.5, width=1.2, spacing=2.0, depth=1.0, end=1.2)
+    aligned = {"gap": 0.0, "offset": 0.0}
+    ramps = aligned | lengths(start=1.5, width=1.2, spacing=2.0, depth=1.0, end=1.2)
     one_bar = lengths(start=1.5, min_depth=0.1, max_depth=0.4, thickness=0.2, spacing=6.0)
     four_bars = one_bar | lengths(spacing=2.0)
     one_gap = lengths(start=1.5, depth=5.0, min_spacing=6.0, max_spacing=6.0)
     four_gaps = one_gap | lengths(min_spacing=2.5, max_spacing=2.5)
     level = lengths(platform=2.0) | {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
     one_tread = lengths(platform=2.0, step_width=1.0)
+    treads = lengths(landing=3.5, step_width=0.31)
+    clearing = lengths(clearing=1.5, thickness=0.2)
     return (
         LimitTest("step up", "step_up", "pit", "depth", steps, lengths(side=2.0)),
         LimitTest("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
-        LimitTest(
-            "stairs",
-            "step_up",
-            "stairs",
-            "step_height",
-            steps,
-            lengths(landing=3.5, step_width=0.31),
-        ),
+        LimitTest("stairs", "step_up", "stairs", "step_height", steps, treads),
         LimitTest("one gap", "gap", "gap_track", "length", gaps, one_gap),
         LimitTest("four gaps", "gap", "gap_track", "length", gaps, four_gaps),
         LimitTest("slope up and down", "slope", "slope", "grade", slopes, lengths(landing=1.5)),
@@ -148,14 +143,7 @@ def limit_tests(limits: RobotLimits, cell: float = CELL) -> tuple[LimitTest, ...
         LimitTest("one bar", "crouched_height", "crawl", "clearance", ceilings, one_bar),
         LimitTest("four bars", "crouched_height", "crawl", "clearance", ceilings, four_bars),
         LimitTest("stone", "foothold", "stones_everywhere", "stone", stones, level),
-        LimitTest(
-            "corridor",
-            "body_width",
-            "maze",
-            "corridor",
-            corridors,
-            lengths(clearing=1.5, thickness=0.2),
-        ),
+        LimitTest("corridor", "body_width", "maze", "corridor", corridors, clearing),
     )
 
 

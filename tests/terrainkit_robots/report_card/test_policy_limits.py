@@ -86,9 +86,8 @@ def test_limits_beyond_the_tested_values_are_bounds(measure):
     header = ("test", "90 % cross", "50 % cross", "in legs", "crossed", "limit of the robot")
     assert rows[0] == header
     by_test = {row[0]: row[1:4] for row in rows}
-    assert by_test["step up"][:2] == 2 * (
-        "> 40.0 cm (> 40.0 to > 40.0)",
-    )  # twice the limit of 20 cm
+    # Twice the limit of 20 cm.
+    assert by_test["step up"][:2] == 2 * ("> 40.0 cm (> 40.0 to > 40.0)",)
     assert by_test["step down"][:2] == 2 * ("< 2.5 cm (< 2.5 to < 2.5)",)
     assert by_test["one bar"][:2] == 2 * ("> 72.0 cm (> 72.0 to > 72.0)",)  # not the highest one
     assert by_test["corridor"][1] == "< 20.0 cm (< 20.0 to < 20.0)"  # also the narrowest one
