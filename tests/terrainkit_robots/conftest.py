@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+import mujoco
 import pytest
 
 import terrainkit_robots
@@ -39,6 +40,18 @@ def robot_file() -> Callable[[str], Path]:
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
     return Robot.load(bundled_robots.urdf_path("quadruped").parent)
+
+
+@pytest.fixture
+def quadruped_of_feet(quadruped, tmp_path) -> Robot:
+    """Return the quadruped, in a folder of its own, with feet that alone collide."""
+    mjspec = mujoco.MjSpec.from_file(str(quadruped.mjcf))
+    for geom in mjspec.geoms:
+        if geom.parent.name not in quadruped.spec.feet:
+            geom.contype = geom.conaffinity = 0
+    (tmp_path / quadruped.mjcf.name).write_text(mjspec.to_xml())
+    (tmp_path / SPEC_FILE).write_text(quadruped.spec.to_toml())
+    return Robot.load(tmp_path)
 
 
 @pytest.fixture(scope="session")

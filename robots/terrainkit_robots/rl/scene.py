@@ -17,7 +17,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.simulation.geoms import lowest_point, only_visual
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
@@ -170,10 +170,10 @@ def _add_boxes(base: Any, model: Any) -> None:
 
     Boxes, since flat meshes have no convex hull.
     """
-    solid = set(model.geom_bodyid[collides(model)].tolist())
-    geoms = [geom for geom in base.find_all("geom") if geom.parent.id not in solid]
-    # A new geom changes the numbers of the others.
-    for body, index in [(geom.parent, geom.id) for geom in geoms]:
+    is_visual = only_visual(model)
+    # Listed before, since a new geom changes the numbers of the others.
+    geoms = [(geom.parent, geom.id) for geom in base.find_all("geom") if is_visual[geom.id]]
+    for body, index in geoms:
         center, size = np.split(model.geom_aabb[index], 2)
         quat, position = model.geom_quat[index], np.zeros(3)
         mujoco.mju_rotVecQuat(position, center, quat)

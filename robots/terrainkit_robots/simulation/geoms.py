@@ -6,6 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.integrations.near_geoms import collides
+
+
+def only_visual(model: Any) -> NDArray[np.bool_]:
+    """Return which geoms belong to bodies without colliding geoms, shape (ngeom,).
+
+    In many files for training, only the feet collide.
+    """
+    solid = np.unique(model.geom_bodyid[collides(model)])
+    return np.isin(model.geom_bodyid, solid, invert=True)
+
 
 def box_corners(model: Any, data: Any, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the corners of the bounding boxes of geoms.

@@ -10,7 +10,7 @@ from terrainkit.errors import ConfigError, one_line
 from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.geoms import box_corners
+from terrainkit_robots.simulation.geoms import box_corners, only_visual
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -121,9 +121,8 @@ def _length(spec: RobotSpec, name: str) -> float:
 def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float, float]:
     """Return length, width and height of the robot in the default pose [m].
 
-    A body without collision shapes counts with its visual ones, since in many files for training
-    only the feet collide. The last value is the height of the center of mass above the lowest
-    point [m].
+    A body without collision shapes counts with its visual ones. The last value is the height of
+    the center of mass above the lowest point [m].
     """
     import mujoco
 
@@ -142,8 +141,7 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float, float, float]:
             raise ConfigError(f"mjcf of {spec.name}: {mjcf} has no joint {name}")
         data.qpos[model.jnt_qposadr[joint]] = position
     mujoco.mj_kinematics(model, data)
-    has_collision = np.bincount(model.geom_bodyid[collides(model)], minlength=model.nbody) > 0
-    is_shape = collides(model) | ~has_collision[model.geom_bodyid]
+    is_shape = collides(model) | only_visual(model)
     geoms = np.flatnonzero(is_shape & (model.geom_bodyid > 0))
     if not len(geoms):
         raise ConfigError("mjcf: got a robot without geoms; expected at least one")

@@ -1,7 +1,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -12,7 +11,6 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card.crossing import CROSSED, OUTCOMES, Crossing, _Progress
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.run import open_run
-from terrainkit_robots.spec.robot_arrays import Robot
 
 PATCH = make_patch(
     MapConfig(
@@ -105,21 +103,14 @@ def test_robot_leaves_the_patch_at_its_border(make_progress, x, is_inside):
     assert outcomes(progress)[3] == ("timed out" if is_inside else "left")
 
 
-def test_a_bar_stops_a_robot_of_which_only_the_feet_collide(tmp_path):
+def test_a_bar_stops_a_robot_of_which_only_the_feet_collide(quadruped_of_feet):
     """The bar is 0.25 m above the ground; the base is 0.3 m high."""
-    run = open_run("quadruped")
-    mjspec = mujoco.MjSpec.from_file(str(run.robot.mjcf))
-    for geom in mjspec.geoms:
-        if geom.parent.name not in run.robot.spec.feet:
-            geom.contype = geom.conaffinity = 0
-    (tmp_path / run.robot.mjcf.name).write_text(mjspec.to_xml())
-    (tmp_path / "robot.toml").write_text(run.robot.spec.to_toml())
+    spec = replace(open_run("quadruped"), robot=quadruped_of_feet)
     crossed = []
     for clearance in (0.25, 0.6):
         bar = {"start": 1.2, "clearance": clearance, "min_depth": 0.2, "max_depth": 0.2}
         terrains = (SubTerrain(terrain="crawl", parameters=bar | {"spacing": 1.0}),)
         config = MapConfig(rows=1, cols=1, patch_size=(4.0, 2.0), border=1.0, terrains=terrains)
-        spec = replace(run, robot=Robot.load(tmp_path))
         crossing = Crossing(spec, generate(config), 3, EvaluationConfig())
         attempts = crossing.attempt(np.zeros(3, np.int64), np.zeros(3, np.int64))
         crossed.append((attempts.outcomes == CROSSED).tolist())

@@ -52,15 +52,9 @@ def test_hip_joints_move_legs_sideways(request, nominal_task, name, hips):
     assert [robot.spec.joint_order[k] for k in found] == [f"{hip}_joint" for hip in hips]
 
 
-def test_bodies_without_collision_shapes_touch_the_ground_alone(quadruped, nominal_task, tmp_path):
-    """Only the feet of this quadruped collide. Its base is below the ground."""
-    mjspec = mujoco.MjSpec.from_file(str(quadruped.mjcf))
-    for geom in mjspec.geoms:
-        if geom.parent.name not in quadruped.spec.feet:
-            geom.contype = geom.conaffinity = 0
-    (tmp_path / quadruped.mjcf.name).write_text(mjspec.to_xml())
-    (tmp_path / "robot.toml").write_text(quadruped.spec.to_toml())
-    robot, touching, masses, counts = Robot.load(tmp_path), [], [], []
+def test_bodies_without_collision_shapes_touch_the_ground_alone(quadruped_of_feet, nominal_task):
+    """The base is below the ground."""
+    robot, touching, masses, counts = quadruped_of_feet, [], [], []
     for visual_collisions in (False, True):
         asset = Asset(visual_collisions=visual_collisions, self_collisions=True)
         scene = Scene(robot, Plane(), nominal_task(asset=asset))

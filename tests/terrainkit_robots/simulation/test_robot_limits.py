@@ -2,7 +2,6 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import mujoco
 import pytest
 
 from terrainkit.errors import ConfigError
@@ -32,17 +31,11 @@ def test_overrides_replace_derived_limits():
         derive_limits(FOLDER / "biped", {"step_up": -1.0})
 
 
-def test_a_robot_of_which_only_the_feet_collide_has_the_size_of_its_visual_shapes(tmp_path):
-    source = FOLDER / "quadruped"
-    shutil.copy(source / SPEC_FILE, tmp_path)
-    spec = RobotSpec.load(source / SPEC_FILE)
-    model = mujoco.MjSpec.from_file(str(source / spec.mjcf))
-    for geom in model.geoms:
-        if geom.type != mujoco.mjtGeom.mjGEOM_SPHERE:
-            geom.contype = geom.conaffinity = 0
-    (tmp_path / spec.mjcf).write_text(model.to_xml())
-    expected = derive_limits(source).limits
-    limits = derive_limits(tmp_path).limits
+def test_a_robot_of_which_only_the_feet_collide_has_the_size_of_its_visual_shapes(
+    quadruped_of_feet,
+):
+    expected = derive_limits(FOLDER / "quadruped").limits
+    limits = derive_limits(quadruped_of_feet.folder).limits
     assert limits.standing_height == pytest.approx(expected.standing_height, abs=0.01)
     assert limits.body_width == pytest.approx(expected.body_width, abs=0.01)
 
