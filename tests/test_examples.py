@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,9 @@ from pathlib import Path
 import cv2
 import nbclient
 import nbformat
+import numpy as np
 import pytest
+import torch
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "docs/examples"
@@ -38,6 +41,7 @@ CHECKS = "".join(
     for path in (
         *(ROOT / "tests/frameworks").glob("*_check.py"),
         ROOT / "tests/terrainkit_cli/test_own_task.py",
+        Path(__file__),
     )
 )
 
@@ -131,6 +135,98 @@ print(legged_robot.Terrain is terrain.Terrain)
     packages, script = ("isaacgym", "legged_gym"), "legged_gym_terrain.py"
     printed = run_with_stand_ins(tmp_path, script, packages, before, check)
     assert printed.splitlines()[-1] == "True"
+
+
+class Echo(torch.nn.Module):
+    """A policy of 10 actions: some of its observations, and then zeros."""
+
+    model = None
+
+    def __init__(self, first, stop):
+        super().__init__()
+        self.first, self.stop = first, stop
+
+    def forward(self, obs):
+        obs = obs[:, self.first : self.stop]
+        return (torch.nn.functional.pad(obs, (0, 10 - obs.shape[1])),)
+
+
+@pytest.fixture
+def microduck():
+    """Return a function that makes a network of the example for an `Echo` of a part."""
+    network = runpy.run_path(str(ROOT / "docs/examples/microduck_policy.py"))["RuntimeNetwork"]
+    head = "neck_pitch", "head_pitch", "head_yaw", "head_roll"
+    left, right = ([f"{side}_{k}" for k in range(5)] for side in ("left", "right"))
+    sizes = {"commands": 3, "projected_gravity": 3, "base_ang_vel": 3, "dof_pos": 14}
+    sizes |= {"dof_vel": 14, "actions": 10, "gait_phase": 2}
+    start, parts = 0, []
+    for name, size in sizes.items():
+        scale, offset = (0.25, 0.0) if name == "base_ang_vel" else (1.0, 0.1 * (name == "dof_pos"))
+        part = {"name": name, "start": start, "stop": start + size, "history": 1}
+        parts.append(part | {"scale": [scale] * size, "offset": [offset] * size})
+        start += size
+    description = {
+        "observation": {"parts": parts},
+        "joints": {
+            "name": [*left, *head, *right],
+            "action_scale": [0.25] * 14,
+            "action_offset": [0.1] * 14,
+        },
+        "action": {"joints": [*left, *right]},
+        "gait": {"period": 0.4, "min_yaw_rate": 0.1},
+        "timing": {"policy_dt": 0.02},
+        "min_norm": 0.04,
+    }
+
+    def make(name):
+        (part,) = (part for part in parts if part["name"] == name)
+        echo = Echo(part["start"], min(part["stop"], part["start"] + 10))
+        policy = network(echo, description)
+        return lambda obs: policy(torch.tensor(obs[None], dtype=torch.float32))[0].numpy()
+
+    return make
+
+
+LEGS = [0, 1, 2, 3, 4, 9, 10, 11, 12, 13]
+HOME = np.array([0, 0, 0.6, -1.2, 0.6, 0, 0, 0, 0, 0, 0, -0.6, 1.2, -0.6])
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "expected"),
+    [
+        ("commands", {48: 0.3, 49: 0.1, 50: 1.0}, [0.3, 0.1, 1.0]),
+        ("commands", {48: 0.03, 49: 0.01, 50: 0.03}, [0, 0, 0]),  # below min_norm
+        ("base_ang_vel", {0: 1.0, 1: -2.0, 2: 4.0}, [0.25, -0.5, 1.0]),
+        ("projected_gravity", {3: 0.1, 5: -1.0}, [0.1, 0, -1.0]),
+        ("dof_pos", {6: 0.2}, [0.1, -0.1, 0.5, -1.3, 0.5, -0.1, -0.1, -0.1, -0.1, -0.1]),
+        ("dof_vel", {20: 3.0}, [3.0]),
+    ],
+)
+def test_microduck_policy_maps_observations_and_actions(microduck, name, numbers, expected):
+    obs = np.zeros(51)
+    obs[[*numbers]] = [*numbers.values()]
+    actions = microduck(name)(obs)
+    legs = 0.1 + 0.25 * np.pad(expected, (0, 10 - len(expected)))
+    np.testing.assert_allclose(actions[LEGS] + HOME[LEGS], legs, atol=1e-6)
+    np.testing.assert_allclose(actions[5:7], 0.1, atol=1e-6)  # the neck stays where it was
+
+
+def test_microduck_policy_keeps_last_action_and_phase(microduck):
+    keep, phases = microduck("actions"), microduck("gait_phase")
+    obs = np.zeros(51)
+    obs[34:48] = np.linspace(-0.1, 0.2, 14)
+    np.testing.assert_allclose(keep(obs)[LEGS], obs[34:48][LEGS], atol=1e-6)
+    obs = np.zeros(51)
+    obs[48] = 0.3
+    for step in range(41):  # two periods
+        actions = phases(obs)
+        angle = 2 * np.pi * step * 0.02 / 0.4
+        expected = 0.1 + 0.25 * np.array([np.sin(angle), np.cos(angle)])
+        np.testing.assert_allclose(actions[:2], expected, atol=1e-5)
+        assert np.abs(actions[7:9]).max() <= 0.0005 + 1e-9
+        obs[34:48] = actions
+    obs[48] = 0.0
+    np.testing.assert_allclose(phases(obs)[:2], 0.1, atol=1e-6)  # commanded to stand
 
 
 def test_notebook_runs_and_shows_maps(tmp_path, monkeypatch):
