@@ -4,6 +4,7 @@ import io
 import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,6 @@ from terrainkit_robots.policy.contracts.contract import (
     FORMATS,
     KNOWN_TERMS,
     MJLAB,
-    TERM_NAMES,
     UNITREE,
     Contract,
 )
@@ -115,45 +115,62 @@ def export_policy(
         check_target(file, overwrite=overwrite and file != folder)
     env = build_eval_env(run, Plane(), 8, EvaluationConfig())
     actor = load_actor(run, env)
-    other_files = copy_model(run.robot.mjcf)
-    if example:
-        other_files[EXAMPLE.name] = EXAMPLE.read_bytes()
-    training = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
-    scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
-    terrain = replace(run.task.terrain, measure_heights=scan)
-    training["task"] = asdict(replace(run.task, terrain=terrain))
-    order = observation_order(env)
-    network = OnnxNetwork(actor, run.task.normalization, order)
-    description = describe_policy(env) | {"recurrent": network.describe_state()} | training
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
-    obs = torch.cat([env.get_observations()["policy"], random])
-    description["estimator"] = None
+    order = observation_order(env)
+    obs = torch.cat([env.get_observations()["policy"], random])[:, order]
+    network = OnnxNetwork(actor, run.task.normalization, order)
+    contents = copy_model(run.robot.mjcf)
+    if example:
+        contents[EXAMPLE.name] = EXAMPLE.read_bytes()
+    description = describe_policy(env) | {"recurrent": network.describe_state()}
+    description |= _describe_training(run, env) | {"estimator": None}
     if isinstance(actor, EstimatorModel):
-        description["estimator"], data = export_estimator(env, network, obs[:, order])
-        other_files[ESTIMATOR_FILE] = data
+        description["estimator"], contents[ESTIMATOR_FILE] = export_estimator(env, network, obs)
     text = json.dumps(description, indent=2) + "\n"
-    metadata = {METADATA_KEY: text}
-    notes = []
-    if deploy_yaml:
-        contract = to_contract(description, UNITREE)
-        other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
-        notes += _unknown_terms(contract)
-    try:
-        contract = to_contract(description, MJLAB)
-        metadata |= write_metadata(contract)
-        notes += _unknown_terms(contract)
-    except ExportError as error:
-        notes.append(f"{ONNX_FILE} has no {error}")
-    networks, errors = _export_networks(network, actor, obs, order, metadata)
-    contents = {JSON_FILE: text.encode(), **networks, **other_files}
+    yaml, metadata, notes = _other_formats(description, deploy_yaml=deploy_yaml)
+    networks, errors = _export_networks(network, actor, obs, {METADATA_KEY: text} | metadata)
+    contents |= networks | yaml | {JSON_FILE: text.encode()}
     if folder.is_dir():  # it may have other files
         with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
             _write_files(path.parent, contents)
     else:
         with atomic_folder(folder) as new:
             _write_files(new, contents)
-    sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
-    return ExportResult(files=files, errors=errors, notes=tuple(notes), **sizes)
+    return ExportResult(
+        files=files,
+        errors=errors,
+        notes=tuple(notes),
+        num_observations=actor.obs_dim,
+        num_actions=env.num_actions,
+    )
+
+
+def _describe_training(run: Run, env: LeggedEnv) -> dict[str, Any]:
+    """Return the iteration of a run, and the task that has the observations of `env`."""
+    scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
+    terrain = replace(run.task.terrain, measure_heights=scan)
+    iteration = read_checkpoint(last_checkpoint(run))["iteration"]
+    return {"iteration": iteration, "task": asdict(replace(run.task, terrain=terrain))}
+
+
+def _other_formats(
+    description: Mapping[str, Any], *, deploy_yaml: bool
+) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """Return `deploy.yaml` if it is asked for, mjlab's metadata, and notes about both."""
+    files: dict[str, bytes] = {}
+    metadata: dict[str, str] = {}
+    notes = []
+    if deploy_yaml:
+        contract = to_contract(description, UNITREE)
+        files[YAML_FILE] = write_deploy_yaml(contract).encode()
+        notes += _unknown_terms(contract)
+    try:
+        contract = to_contract(description, MJLAB)
+        metadata = write_metadata(contract)
+        notes += _unknown_terms(contract)
+    except ExportError as error:
+        notes.append(f"{ONNX_FILE} has no {error}")
+    return files, metadata, notes
 
 
 def _unknown_terms(contract: Contract) -> list[str]:
@@ -162,15 +179,10 @@ def _unknown_terms(contract: Contract) -> list[str]:
     unknown = [term.name for term in contract.terms if term.name not in known_terms]
     if not unknown:
         return []
-    formulas = {
-        name: _FORMULAS[own]
-        for own, names in TERM_NAMES.items()
-        for name in names
-        if own in _FORMULAS
-    }
-    known = "; ".join(dict.fromkeys(formulas[name] for name in unknown if name in formulas))
     what = f"controllers that read it stop at unknown observations: {listing(unknown)}"
-    add = f"add them as policy.json describes{': ' if known else ''}{known}"
+    add = "add them as policy.json describes"
+    if "foot_contact" in unknown:
+        add += f": {_FORMULAS['foot_contact']}"
     return [f"{FORMATS[contract.style]}: {what}; {add}"]
 
 
@@ -263,14 +275,27 @@ def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the actions of an ONNX file for the observations (n, k) of each step."""
     session = make_session(data)
     results = []
-    shapes = [node.shape for node in session.get_inputs()[1:]]
-    state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
+    state = make_state(session, len(steps[0]))
     for obs in steps:
         actions, *state = call_model(session, obs, state)
         results.append(actions)
     return results
 
 
+@contextmanager
+def _quiet_torch() -> Iterator[None]:
+    """Export without gradients and without torch's warnings of what is as it should be."""
+    with warnings.catch_warnings(), torch.no_grad():
+        # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
+        # Recurrent networks check the shapes of their inputs.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)
+        warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
+        yield
+
+
+@_quiet_torch()
 def export_onnx(
     network: torch.nn.Module,
     obs: torch.Tensor,
@@ -303,8 +328,7 @@ def export_onnx(
         dynamo=False,
     )
     model = onnx.load_model_from_string(file.getvalue())
-    for key, value in metadata.items():
-        model.metadata_props.add(key=key, value=value)
+    onnx.helper.set_model_props(model, dict(metadata))
     onnx.checker.check_model(model)
     return bytes(model.SerializeToString())
 
@@ -325,14 +349,10 @@ def export_estimator(
         for key in ("scale", "offset")
     )
     estimator = EstimatorNetwork(network, scale, offset)
-    with warnings.catch_warnings(), torch.no_grad():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        data = export_onnx(estimator, obs, {}, "estimates")
     keys = "name", "start", "stop", "unit"
-    return {
-        "file": ESTIMATOR_FILE,
-        "parts": [{key: part[key] for key in keys} for part in parts],
-    }, data
+    described = [{key: part[key] for key in keys} for part in parts]
+    data = export_onnx(estimator, obs, {}, "estimates")
+    return {"file": ESTIMATOR_FILE, "parts": described}, data
 
 
 def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
@@ -356,31 +376,21 @@ def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
     return error
 
 
+@_quiet_torch()
 def _export_networks(
-    network: OnnxNetwork,
-    actor: MLPModel,
-    obs: torch.Tensor,
-    order: NDArray[np.int64],
-    metadata: Mapping[str, str],
+    network: OnnxNetwork, actor: MLPModel, obs: torch.Tensor, metadata: Mapping[str, str]
 ) -> tuple[dict[str, bytes], tuple[float, float]]:
-    """Return the ONNX and TorchScript files, and their errors on observations (n, k)."""
+    """Return the ONNX and TorchScript files, and their errors on exported observations (n, k)."""
     # A recurrent network depends on the observations before.
     steps = [obs.roll(k, 0) for k in range(RECURRENT_STEPS if actor.is_recurrent else 1)]
-    with warnings.catch_warnings(), torch.no_grad():
-        # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
-        # Recurrent networks check the shapes of their inputs.
-        warnings.simplefilter("ignore", torch.jit.TracerWarning)
-        warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
-        onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
-        torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
-        script = torch.jit.load(io.BytesIO(script_file.getvalue()))
-        live = [network.clipped(actor, step).numpy() for step in steps]
-        # TorchScript of rsl-rl keeps the state of one robot.
-        rows = slice(1) if actor.is_recurrent else slice(None)
-        script_actions = [script(step[rows][:, order]).numpy() for step in steps]
-    onnx_actions = run_onnx(onnx_data, [step[:, order].numpy() for step in steps])
+    onnx_data, script_file = export_onnx(network, obs, metadata), io.BytesIO()
+    torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
+    script = torch.jit.load(io.BytesIO(script_file.getvalue()))
+    live = [network.clipped(actor, step[:, network.indices]).numpy() for step in steps]
+    # TorchScript of rsl-rl keeps the state of one robot.
+    rows = slice(1) if actor.is_recurrent else slice(None)
+    script_actions = [script(step[rows]).numpy() for step in steps]
+    onnx_actions = run_onnx(onnx_data, [step.numpy() for step in steps])
     errors = (
         verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
         verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
@@ -479,14 +489,13 @@ def _terms(
 ) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
     """Yield name, term, first number in an observation of `env`, size and steps of each term."""
     start = 0
-    steps = env.history_length
-    has_history = "history" in env.obs_terms[group]
+    steps = env.history_length if "history" in env.obs_terms[group] else 1
     for name, term in env.obs_terms[group].items():
         size = term.function(env).shape[1]
         if name == "history":  # of the terms before it
-            has_history = False
+            steps = 1
         else:
-            yield name, term, start, size, steps if has_history else 1
+            yield name, term, start, size, steps
         start += size
 
 

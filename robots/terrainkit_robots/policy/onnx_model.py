@@ -44,12 +44,13 @@ def run_model(received: Iterator[Any], data: bytes, folder: Path) -> Iterator[di
         session = make_session(parsed.SerializeToString())
     except Exception as error:  # errors of onnx and onnxruntime have no common class
         raise ConfigError(f"not an ONNX file that can be loaded: {error}") from error
-    num_obs, sizes = _input_sizes(session)
+    num_obs = _num_observations(session)
+    num_states = len(session.get_inputs()) - 1
     outputs = [output.type for output in session.get_outputs()]
-    if len(outputs) <= len(sizes) or outputs[0] not in _FLOATS:
-        expected = f"expected actions of tensor(float), and {len(sizes)} states"
+    if len(outputs) <= num_states or outputs[0] not in _FLOATS:
+        expected = f"expected actions of tensor(float), and {num_states} states"
         raise ConfigError(f"got the outputs {listing(outputs)}; {expected}")
-    state = make_state(sizes, 2)
+    state = make_state(session, 2)
     actions, *new = call_model(session, np.zeros((2, num_obs), np.float32), state)
     if len(actions) != 2 or actions.ndim != 2:
         raise ConfigError(f"got actions of shape {actions.shape}; expected (2, a) for two rows")
@@ -59,7 +60,7 @@ def run_model(received: Iterator[Any], data: bytes, folder: Path) -> Iterator[di
     yield {"sizes": [num_obs, actions.shape[1]], "metadata": metadata}
     for obs, dones in received:
         if state and state[0].shape[1] != len(obs):
-            state = make_state(sizes, len(obs))
+            state = make_state(session, len(obs))
         elif dones is not None:
             for part in state:
                 part[:, dones] = 0
@@ -67,9 +68,10 @@ def run_model(received: Iterator[Any], data: bytes, folder: Path) -> Iterator[di
         yield {"actions": actions}
 
 
-def make_state(sizes: Sequence[Sequence[int]], count: int) -> list[NDArray[np.float32]]:
+def make_state(session: onnxruntime.InferenceSession, count: int) -> list[NDArray[np.float32]]:
     """Return the state of `count` robots at the start: zeros, shape (layers, count, width)."""
-    return [np.zeros((layers, count, width), np.float32) for layers, width in sizes]
+    shapes = [node.shape for node in session.get_inputs()[1:]]
+    return [np.zeros((layers, count, width), np.float32) for layers, _, width in shapes]
 
 
 def make_session(model: bytes) -> onnxruntime.InferenceSession:
@@ -113,10 +115,10 @@ def call_model(
         raise ConfigError(reason) from error
 
 
-def _input_sizes(session: onnxruntime.InferenceSession) -> tuple[int, list[tuple[int, int]]]:
-    """Return the number of observations, and layers and width of each state.
+def _num_observations(session: onnxruntime.InferenceSession) -> int:
+    """Return the number of observations.
 
-    The first input has the shape (n, k) or (1, k), the states have (layers, n, width).
+    The first input must have the shape (n, k) or (1, k), and the states (layers, n, width).
     """
     first, *others = [node.shape for node in session.get_inputs()] or [()]
     is_valid = len(first) == 2 and isinstance(first[1], int) and _is_batch(first[0])
@@ -127,7 +129,7 @@ def _input_sizes(session: onnxruntime.InferenceSession) -> tuple[int, list[tuple
         inputs = [f"{node.name} {node.type} {node.shape}" for node in session.get_inputs()]
         expected = "expected one of shape (n, k) or (1, k), and states of shape (layers, n, width)"
         raise ConfigError(f"got the inputs {listing(inputs)}; {expected}")
-    return first[1], [(shape[0], shape[2]) for shape in others]
+    return int(first[1])
 
 
 def _is_batch(size: Any) -> bool:
