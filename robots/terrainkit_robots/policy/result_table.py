@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 Row = TypeVar("Row")
@@ -29,22 +29,17 @@ class ResultTable(Generic[Row]):
         """Return the rows of a table."""
         return self.tables[name]
 
-    def document(self) -> dict[str, Any]:
-        """Return the results as values of JSON."""
+    def as_dict(self) -> dict[str, Any]:
+        """Return the results by name."""
         version = {} if self.schema_version is None else {"schema_version": self.schema_version}
-        values = {**self.about, **self.tables, **self.remarks}
-        return version | {name: _plain(value) for name, value in values.items()}
+        return {**version, **self.about, **self.tables, **self.remarks}
 
     def to_json(self, indent: int = 1) -> str:
         """Return the results as JSON; equal results give equal bytes."""
-        return json.dumps(self.document(), indent=indent) + "\n"
+        return json.dumps(self.as_dict(), indent=indent, default=_values) + "\n"
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, ResultTable):
-        return value.document()
-    if hasattr(value, "as_dict"):
-        return value.as_dict()
-    if is_dataclass(value):
-        return asdict(value)  # type: ignore[arg-type]
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+def _values(value: Any) -> dict[str, Any]:
+    """Return the values of a table or a dataclass."""
+    values: dict[str, Any] = value.as_dict() if hasattr(value, "as_dict") else vars(value)
+    return values
