@@ -182,13 +182,19 @@ def measure(
 
 def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempts) -> TestResult:
     rows = len(terrain_map.difficulty)
-    by_level = attempts.outcomes.reshape(rows, -1), attempts.seconds.reshape(rows, -1)
-    levels = tuple(
-        _level_result(level, values, outcomes, seconds)
-        for level, values, outcomes, seconds in zip(
-            range(rows), _changing_parameters(terrain_map, col), *by_level, strict=True
+    outcomes, seconds = attempts.outcomes.reshape(rows, -1), attempts.seconds.reshape(rows, -1)
+    levels = []
+    for level, parameters in enumerate(_changing_parameters(terrain_map, col)):
+        success, interval = _success(outcomes[level])
+        result = LevelResult(
+            level=level,
+            parameters=parameters,
+            outcomes={each: int((outcomes[level] == k).sum()) for k, each in enumerate(OUTCOMES)},
+            success=success,
+            interval=interval,
+            seconds=float(np.nanmean(seconds[level])) if success else None,
         )
-    )
+        levels.append(result)
     failed = [result.level for result in levels if result.success < 1]
     passed = (failed[0] if failed else rows) - 1
     success, interval = _success(attempts.outcomes)
@@ -197,7 +203,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
         passed=passed if passed >= 0 else None,
         success=success,
         interval=interval,
-        levels=levels,
+        levels=tuple(levels),
     )
 
 
@@ -215,20 +221,6 @@ def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, An
         for level, friction in zip(realized, frictions, strict=True):
             level["friction"] = friction
     return [{name: level[name] for name in names} for level in realized]
-
-
-def _level_result(
-    level: int, parameters: dict[str, Any], outcomes: NDArray[np.int8], seconds: NDArray[np.float64]
-) -> LevelResult:
-    success, interval = _success(outcomes)
-    return LevelResult(
-        level=level,
-        parameters=parameters,
-        outcomes={name: int((outcomes == k).sum()) for k, name in enumerate(OUTCOMES)},
-        success=success,
-        interval=interval,
-        seconds=float(np.nanmean(seconds)) if success else None,
-    )
 
 
 def _success(outcomes: NDArray[np.int8]) -> tuple[float, tuple[float, float]]:

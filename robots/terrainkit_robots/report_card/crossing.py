@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -35,15 +35,64 @@ TIME_FACTOR, EXTRA_TIME = 1.5, 5.0
 largest commanded yaw rate, and a constant [s]."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Attempts:
-    """The attempts of n robots to cross a patch."""
+    """The attempts of n robots to cross a patch.
 
-    outcomes: NDArray[np.int8]
-    """Index into `OUTCOMES`, shape (n,)."""
+    Attributes:
+        outcomes: Index into `OUTCOMES`, shape (n,).
+        seconds: Time of the attempts that crossed [s], else NaN, shape (n,).
+    """
 
-    seconds: NDArray[np.float64]
-    """Time of the attempts that crossed [s], else NaN, shape (n,)."""
+    def __init__(
+        self, env: LeggedEnv, patches: list[Patch], speed: float, radius: float = GOAL_RADIUS
+    ) -> None:
+        n = len(patches)
+        self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
+        self._env = env
+        self._active = np.ones(n, bool)
+        self._steps = 0
+        # Robots on the same patch take its routes in turn.
+        earlier = Counter[tuple[float, float]]()
+        routes = []
+        for patch in patches:
+            every = patch_routes(patch)
+            routes.append(every[earlier[patch.grid.lower] % len(every)])
+            earlier[patch.grid.lower] += 1
+        goals = np.full((n, max(map(len, routes)), 2), np.nan)
+        for robot, route in enumerate(routes):
+            goals[robot, : len(route)] = route
+        self._waypoints = Waypoints.make(n, goals.shape[1], radius)
+        self._waypoints.reset(np.arange(n), goals)
+        self._speed = speed
+        self._lower = np.array([patch.grid.lower for patch in patches])
+        self._upper = np.array([patch.grid.upper for patch in patches])
+        turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
+        lengths = np.nanmax(route_lengths(env.curriculum.progress.start, goals), axis=1)
+        seconds = TIME_FACTOR * lengths / speed + turn + EXTRA_TIME
+        self._max_steps = np.rint(seconds / env.cfg.dt)
+
+    def schedule(self) -> Iterator[NDArray[np.float32]]:
+        """Yield the commands of each step until every attempt has ended."""
+        while self._active.any():
+            state = self._env.state
+            yaw, limits = quat_to_yaw(state.base_quat), self._env.cfg.commands.ang_vel_yaw
+            yield self._waypoints.commands(
+                state.base_pos[:, :2], yaw, self._speed, HEADING_STIFFNESS, limits
+            )
+
+    def update(self, fell: NDArray[np.bool_]) -> None:
+        """Record the attempts that a step ended."""
+        self._steps += 1
+        position = self._env.state.base_pos[:, :2]
+        crossed = self._waypoints.update(position)
+        left = ((position < self._lower) | (position > self._upper)).any(axis=1)
+        late = self._steps >= self._max_steps
+        for outcome, mask in ((FELL, fell), (CROSSED, crossed), (LEFT, left), (TIMED_OUT, late)):
+            ended = self._active & mask
+            self.outcomes[ended] = outcome
+            self._active &= ~ended
+            if outcome == CROSSED:
+                self.seconds[ended] = self._steps * self._env.cfg.dt
 
 
 class Crossing:
@@ -108,62 +157,7 @@ class Crossing:
             with torch.inference_mode():
                 reset(torch.ones(env.num_envs, dtype=torch.bool))
         patches = [self._map.patch(*place) for place in zip(levels, columns, strict=True)]
-        progress = _Progress(env, patches, self.speed, self._goal_radius)
-        for _, fell in rollout(env, self._policy, progress.schedule()):
-            progress.update(fell)
-        return Attempts(outcomes=progress.outcomes, seconds=progress.seconds)
-
-
-class _Progress:
-    """The progress of the robots on their patches."""
-
-    def __init__(
-        self, env: LeggedEnv, patches: list[Patch], speed: float, radius: float = GOAL_RADIUS
-    ) -> None:
-        n = len(patches)
-        self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
-        self._env = env
-        self._active = np.ones(n, bool)
-        self._steps = 0
-        # Robots on the same patch take its routes in turn.
-        earlier = Counter[tuple[float, float]]()
-        routes = []
-        for patch in patches:
-            every = patch_routes(patch)
-            routes.append(every[earlier[patch.grid.lower] % len(every)])
-            earlier[patch.grid.lower] += 1
-        goals = np.full((n, max(map(len, routes)), 2), np.nan)
-        for robot, route in enumerate(routes):
-            goals[robot, : len(route)] = route
-        self._waypoints = Waypoints.make(n, goals.shape[1], radius)
-        self._waypoints.reset(np.arange(n), goals)
-        self._speed = speed
-        self._lower = np.array([patch.grid.lower for patch in patches])
-        self._upper = np.array([patch.grid.upper for patch in patches])
-        turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
-        lengths = np.nanmax(route_lengths(env.curriculum.progress.start, goals), axis=1)
-        seconds = TIME_FACTOR * lengths / speed + turn + EXTRA_TIME
-        self._max_steps = np.rint(seconds / env.cfg.dt)
-
-    def schedule(self) -> Iterator[NDArray[np.float32]]:
-        """Yield the commands of each step until every attempt has ended."""
-        while self._active.any():
-            state = self._env.state
-            yaw, limits = quat_to_yaw(state.base_quat), self._env.cfg.commands.ang_vel_yaw
-            yield self._waypoints.commands(
-                state.base_pos[:, :2], yaw, self._speed, HEADING_STIFFNESS, limits
-            )
-
-    def update(self, fell: NDArray[np.bool_]) -> None:
-        """Record the attempts that a step ended."""
-        self._steps += 1
-        position = self._env.state.base_pos[:, :2]
-        crossed = self._waypoints.update(position)
-        left = ((position < self._lower) | (position > self._upper)).any(axis=1)
-        late = self._steps >= self._max_steps
-        for outcome, mask in ((FELL, fell), (CROSSED, crossed), (LEFT, left), (TIMED_OUT, late)):
-            ended = self._active & mask
-            self.outcomes[ended] = outcome
-            self._active &= ~ended
-            if outcome == CROSSED:
-                self.seconds[ended] = self._steps * self._env.cfg.dt
+        attempts = Attempts(env, patches, self.speed, self._goal_radius)
+        for _, fell in rollout(env, self._policy, attempts.schedule()):
+            attempts.update(fell)
+        return attempts

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import TerrainkitWarning
 from terrainkit.feasibility import RobotLimits
 from terrainkit.geometry.grid import Grid
@@ -247,8 +247,10 @@ def measure_limits(
             for counts in zip(hardness, crossed, strict=True)
         ]
         seed = config.seed + number
-        # A map of these patches alone: the time of a step grows with the number of solids.
-        terrain_map = _generate(limits_config(tests, asked, seed, cell))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
+            # A map of these patches alone: the time of a step grows with the number of solids.
+            terrain_map = generate(limits_config(tests, asked, seed, cell))
         start = replace(config, seed=seed)
         crossing = Crossing(spec, terrain_map, len(columns), start, cell / CELL)
         outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
@@ -291,12 +293,6 @@ def _result(
         counts=tuple(counts),
         robot_limit=robot_limit,
     )
-
-
-def _generate(config: MapConfig) -> TerrainMap:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
-        return generate(config)
 
 
 def _bounded(value: float, result: LimitResult, text: str) -> str:

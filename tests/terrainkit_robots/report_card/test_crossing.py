@@ -8,7 +8,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.report_card.crossing import CROSSED, OUTCOMES, Crossing, _Progress
+from terrainkit_robots.report_card.crossing import CROSSED, OUTCOMES, Attempts, Crossing
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.run import open_run
 
@@ -33,7 +33,7 @@ def make_progress():
         cfg = SimpleNamespace(commands=Commands(), dt=0.5)
         progress = SimpleNamespace(start=np.full((number, 2), 2.5))
         env = SimpleNamespace(state=state, curriculum=SimpleNamespace(progress=progress), cfg=cfg)
-        return _Progress(env, [PATCH] * number, 0.75), env
+        return Attempts(env, [PATCH] * number, 0.75), env
 
     return make
 
