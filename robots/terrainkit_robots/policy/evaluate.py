@@ -1,6 +1,6 @@
 """Evaluate a policy without noise and randomization: velocity errors, gait, falls and success."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from typing import Annotated, Any
@@ -211,16 +211,28 @@ def command_grid(commands: Commands) -> FloatArray:
     Returns:
         Forward and left velocity [m/s] and yaw velocity [rad/s], shape (k, 3). Usually, k is 75.
     """
-    ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
-    fractions = ((1.0, 0.5), (1.0,), (1.0, 0.5))
-    axes = [
-        np.clip([low * f for f in parts] + [0.0] + [high * f for f in parts], low, high)
-        for (low, high), parts in zip(ranges, fractions, strict=True)
-    ]
-    grid = np.array(list(product(*axes)), np.float32)
+    halves = (-1.0, -0.5, 0.0, 0.5, 1.0)
+    grid = commands_at(commands, list(product(halves, (-1.0, 0.0, 1.0), halves)))
     grid[np.hypot(grid[:, 0], grid[:, 1]) < commands.min_norm, :2] = 0
     grid[np.abs(grid[:, 2]) < commands.min_norm, 2] = 0
-    return np.unique(grid + np.float32(0), axis=0)  # + 0 turns -0 into 0
+    return np.unique(grid, axis=0)
+
+
+def commands_at(commands: Commands, fractions: Sequence[Sequence[float]]) -> FloatArray:
+    """Return commands at fractions of the limits of a task: of the lower limit if negative.
+
+    Args:
+        commands: The ranges of the task.
+        fractions: Fractions for each command, shape (k, 3).
+
+    Returns:
+        Forward and left velocity [m/s] and yaw velocity [rad/s], in these ranges, shape (k, 3).
+    """
+    ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
+    low, high = np.array(ranges, np.float32).T
+    parts = np.array(fractions, np.float32)
+    # + 0 turns -0 into 0.
+    return np.clip(np.where(parts < 0, -parts * low, parts * high), low, high) + np.float32(0)
 
 
 def direction_commands(commands: Commands) -> dict[str, FloatArray]:

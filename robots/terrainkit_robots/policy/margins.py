@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, commands_at
 from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.policy_rollout import EvaluationRollout, Progress
@@ -171,12 +171,8 @@ def measure_margins(
 
 def margin_commands(commands: Commands) -> FloatArray:
     """Return the `COMMANDS` of a task, without repetitions, shape (k, 3)."""
-    ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
-    low, high = np.array(ranges, np.float32).T
-    fractions = np.array(COMMANDS, np.float32)
-    values = np.clip(np.where(fractions < 0, -fractions * low, fractions * high), low, high)
-    # + 0 turns -0 into 0.
-    return np.array(list(dict.fromkeys(map(tuple, (values + 0).tolist()))), np.float32)
+    values = commands_at(commands, COMMANDS).tolist()
+    return np.array(list(dict.fromkeys(map(tuple, values))), np.float32)
 
 
 def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
