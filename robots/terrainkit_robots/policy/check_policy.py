@@ -266,7 +266,6 @@ def score_contracts(
     actor = load_policy(spec, env)
     fallen = np.zeros(env.num_envs, bool)
     velocity = []
-    actor.reset(torch.ones(env.num_envs, dtype=torch.bool))  # type: ignore[attr-defined]
     start = min(SETTLING_SECONDS, seconds / 2)
 
     def act(obs: Any) -> torch.Tensor:

@@ -11,10 +11,10 @@ from terrainkit.errors import listing
 from terrainkit.perception.orientation import projected_gravity
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit_robots.policy.contracts.contract import (
+    COMMANDS,
     DEFAULT_STEP_DT,
     Contract,
     ContractError,
-    ContractTerm,
     own_name,
 )
 from terrainkit_robots.policy.contracts.contract_robot import contract_robot, imu_position
@@ -31,6 +31,21 @@ _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}
 """Terms that are another order or offset of a term of the environment."""
 
 
+def _running_phase(env: LeggedEnv) -> FloatArray:
+    return env.gait.phases(env.steps_since_reset * env.cfg.dt, np.ones(env.num_envs, bool))[0]
+
+
+def _xyzw_gravity(env: LeggedEnv) -> FloatArray:
+    return projected_gravity(np.roll(env.state.base_quat, 1, axis=1))
+
+
+_OTHER_TERMS = {
+    "running_gait_phase": ObservationTerm(_running_phase),
+    "xyzw_projected_gravity": ObservationTerm(_xyzw_gravity),
+}
+"""Terms of other projects that differ from terrainkit's."""
+
+
 class ContractInterface(PolicyInterface):
     """What policies observe and do by their contracts: raw terms, without scales.
 
@@ -43,11 +58,12 @@ class ContractInterface(PolicyInterface):
 
     def observation_terms(self, env: LeggedEnv, groups: ObsTerms) -> dict[str, ObservationTerm]:
         """Return the raw terms of the first contract by terrainkit's names."""
-        known = {**groups["privileged"], **groups["policy"], **_other_terms()}
+        known = {**groups["privileged"], **groups["policy"], **_OTHER_TERMS}
         history = known.pop("history", None)
         contract = self._contracts[0]
         known["base_lin_vel"] = _velocity_term(contract, known["base_lin_vel"], env.robot)
-        names = [_source(contract, term, [*known]) for term in contract.terms]
+        own = [own_name(contract.style, term.name, [*known]) for term in contract.terms]
+        names = [_SOURCES.get(name, name) for name in own]
         if any(name.endswith("projected_gravity") for name in names):  # repairs exchange them
             names += ["projected_gravity", "xyzw_projected_gravity"]
         raw = {
@@ -72,20 +88,6 @@ class ContractInterface(PolicyInterface):
         return target
 
 
-def _other_terms() -> dict[str, ObservationTerm]:
-    """Return the terms of other projects that differ from terrainkit's."""
-
-    def running_phase(env: LeggedEnv) -> FloatArray:
-        return env.gait.phases(env.steps_since_reset * env.cfg.dt, np.ones(env.num_envs, bool))[0]
-
-    return {
-        "running_gait_phase": ObservationTerm(running_phase),
-        "xyzw_projected_gravity": ObservationTerm(
-            lambda env: projected_gravity(np.roll(env.state.base_quat, 1, axis=1))
-        ),
-    }
-
-
 def _velocity_term(contract: Contract, own: ObservationTerm, robot: Robot) -> ObservationTerm:
     """Return the velocity of the point that a contract means: the IMU, or the base's frame."""
     has_imu = any(term.params.get("imu") for term in contract.terms)
@@ -96,12 +98,6 @@ def _velocity_term(contract: Contract, own: ObservationTerm, robot: Robot) -> Ob
         return own.function(env) + np.cross(env.state.base_ang_vel, lever)
 
     return replace(own, function=velocity)
-
-
-def _source(contract: Contract, term: ContractTerm, known: Sequence[str]) -> str:
-    """Return the term of the environment that has the numbers of a contract's term."""
-    name = own_name(contract.style, term.name, known)
-    return _SOURCES.get(name, name)
 
 
 class MappedPolicy:
@@ -158,7 +154,7 @@ def _table(
     ids = [joints.index(joint) for joint in contract.joints]
     for term in contract.terms:
         own = own_name(contract.style, term.name, [*widths])
-        source = _source(contract, term, [*widths])
+        source = _SOURCES.get(own, own)
         index = starts[source] + np.arange(widths[source])
         if source in ("dof_pos", "dof_vel"):
             index = index[ids]
@@ -225,9 +221,8 @@ def contract_task(contract: Contract, task: Task) -> Task:
         raise ContractError("history_length: got several", "one, with use_gym_history")
     step_dt, dt = contract.step_dt or DEFAULT_STEP_DT, contract.physics_dt or task.sim.dt
     decimation = max(1, round(step_dt / dt))
-    ranges = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
     commands: dict[str, Any] = {
-        ranges[name]: limits for name, limits in contract.commands.items() if name in ranges
+        COMMANDS[name]: limits for name, limits in contract.commands.items() if name in COMMANDS
     }
     for term in contract.terms:
         if "period" in term.params:

@@ -35,6 +35,14 @@ _WIDTHS = {"base_lin_vel": 3, "base_ang_vel": 3, "projected_gravity": 3, "comman
 _WIDTHS |= {"gait_phase": 2, "running_gait_phase": 2}
 """Width of the terms whose numbers may be exchanged or have another sign."""
 
+_OTHER_KINDS = {
+    "dof_pos": ("absolute_dof_pos", "the joint positions are absolute in"),
+    "absolute_dof_pos": ("dof_pos", "the joint positions are relative in"),
+    "projected_gravity": ("xyzw_projected_gravity", "the quaternion is read as xyzw in"),
+    "xyzw_projected_gravity": ("projected_gravity", "the quaternion is wxyz in"),
+}
+"""Terms that are mistaken for each other, and what is then true."""
+
 MAX_PAIRS = 100
 """Largest number of pairs of joints that are exchanged; of more, neighbors and mirror images."""
 
@@ -113,16 +121,9 @@ def _term_repairs(contract: Contract, k: int, name: str) -> Iterator[Repair]:
         if order == (term.columns or (*range(width),)):
             continue
         yield change("POL024", f"the order {[j + 1 for j in order]} is that of", columns=order)
-    for kinds, text in (
-        (("dof_pos", "absolute_dof_pos"), "the joint positions are {} in"),
-        (("projected_gravity", "xyzw_projected_gravity"), "the quaternion is {} in"),
-    ):
-        if name in kinds:
-            other = kinds[name == kinds[0]]
-            words = {"dof_pos": "relative", "absolute_dof_pos": "absolute"}
-            words |= {"projected_gravity": "wxyz", "xyzw_projected_gravity": "read as xyzw"}
-            new = TERM_NAMES[other][contract.style]
-            yield change("POL026", text.format(words[other]), name=new)
+    if name in _OTHER_KINDS:
+        other, text = _OTHER_KINDS[name]
+        yield change("POL026", text, name=TERM_NAMES[other][contract.style])
 
 
 def other_simulations(contract: Contract, robot: Robot) -> Iterator[Repair]:

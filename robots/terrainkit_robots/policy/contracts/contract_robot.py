@@ -66,11 +66,10 @@ def contract_robot(contract: Contract, robot: Robot) -> Robot:
         raise ContractError(got, f"joints among {listing(spec.joint_order)}")
     others = [name for name in spec.joint_order if name not in order]
     joints: dict[str, list[Any]] = {"name": [*order, *others]}
-    for table in ("stiffness", "damping"):
+    keys = {"stiffness": "stiffness", "damping": "damping", "default_pose": "default_position"}
+    for table, key in keys.items():
         own = spec.per_joint(table)
-        joints[table] = [*getattr(contract, table), *(own[name] for name in others)]
-    pose = spec.per_joint("default_pose")
-    joints["default_position"] = [*contract.default_pose, *(pose[name] for name in others)]
+        joints[key] = [*getattr(contract, table), *(own[name] for name in others)]
     joints["action_scale"] = [*contract.action_scale, *(0.0 for _ in others)]
     new = replace_joints(robot, joints, "P")
     change = _lowest_foot(robot) - _lowest_foot(new)

@@ -9,6 +9,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit_robots.policy.contracts.contract import (
+    COMMANDS,
     FORMATS,
     TERM_NAMES,
     Contract,
@@ -134,7 +135,6 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
         )
         terms.append(term)
     commands = document["task"]["commands"]
-    ranges = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
     return Contract(
         style=style,
         joints=tuple(joints["name"]),
@@ -146,5 +146,5 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
         terms=tuple(terms),
         step_dt=document["timing"]["policy_dt"],
         physics_dt=document["timing"]["physics_dt"],
-        commands={name: tuple(commands[key]) for name, key in ranges.items()},
+        commands={name: tuple(commands[key]) for name, key in COMMANDS.items()},
     )
