@@ -225,12 +225,9 @@ def call_script(module: Any, obs: torch.Tensor) -> torch.Tensor:
 
 def _states(module: Any) -> list[tuple[Any, str, torch.Tensor]]:
     """Return owner, name and value of each buffer with a state, shape (layers, n, width)."""
-    found = []
-    for path, value in module.named_buffers():
-        *parents, name = path.split(".")
-        owner = module
-        for parent in parents:
-            owner = getattr(owner, parent)
-        if value.dim() == 3 and re.search("hidden|cell|state", name):
-            found.append((owner, name, value))
-    return found
+    return [
+        (owner, name, value)
+        for owner in module.modules()
+        for name, value in owner.named_buffers(recurse=False)
+        if value.dim() == 3 and re.search("hidden|cell|state", name)
+    ]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.task_facts import Training
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -146,8 +147,7 @@ class Host(ABC):
         """Return the height of the lowest point of each robot above the ground [m], shape (n,)."""
         model, data = self.model, mujoco.MjData(self.model)
         is_robot = model.body_rootid == model.body_rootid[model.jnt_bodyid[0]]
-        collides = (model.geom_contype | model.geom_conaffinity) > 0
-        geoms = np.flatnonzero(collides & is_robot[model.geom_bodyid]).tolist()
+        geoms = np.flatnonzero(collides(model) & is_robot[model.geom_bodyid]).tolist()
         qpos, heights = self.qpos(), []
         for positions in qpos:
             data.qpos[:] = positions
