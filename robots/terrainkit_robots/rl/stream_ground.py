@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import TerrainMap, TerrainStream
+from terrainkit import MapConfig, TerrainMap, TerrainStream
 from terrainkit.errors import ConfigError, listing
 from terrainkit.export.mjcf_map import Collision, collision_boxes, surface_with_boxes
 from terrainkit.files.memory import check_memory
@@ -18,7 +19,7 @@ from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.geometry.solid_raster import PIXEL, PatchRasters
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.integrations.near_geoms import PatchGeoms
-from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.config import Task, Terrain
 from terrainkit_robots.rl.terrain import Ground, Ids, MapGround, add_material
 from terrainkit_robots.transforms import FloatArray
 
@@ -77,52 +78,17 @@ class StreamGround(Ground):
         self._sample = sample = ground.terrain_map
         self._collision: Collision = "boxes" if task.terrain.collision == "boxes" else "hfield"
         _require_supported(sample)
-        cell, number = sample.config.cell, task.env.num_envs
-        terrain = task.terrain
-        points = terrain.measured_points_x, terrain.measured_points_y
-        near = (0.0, *terrain.foot_points_x), (0.0, *terrain.foot_points_y)
-        # A foot reaches as far as the ground is measured, and its points are around it.
-        reach = max(
-            math.hypot(*(max(map(abs, values)) for values in points)),
-            _REACH + math.hypot(*(max(map(abs, values)) for values in near)),
-        )
-        margin = math.ceil((_LEAVE + reach) / cell)
-        config = replace(
-            sample.config,
-            border=margin * cell,
-            border_height=sample.config.edge_height,
-            border_rim=0.0,
-        )
+        number = task.env.num_envs
+        config = _with_border(sample.config, task.terrain)
         self.stream = TerrainStream(config, task.runner.seed)
         self._grid = grid = self.stream.map_config(0, 0, 0, 0.0).grid
-        places = -(-number // math.ceil(math.sqrt(number))), math.ceil(math.sqrt(number))
-        shape = places[0] * grid.shape[0], places[1] * grid.shape[1]
-        per_sample = _BYTES_PER_SAMPLE
-        if len(sample.solids):
-            per_sample += round(_BYTES_PER_PIXEL * (cell / PIXEL) ** 2)
-        what = f"terrain.stream with env.num_envs {number}"
-        check_memory(math.prod(shape) * per_sample, what, ("env.num_envs", number))
-        places_of = np.column_stack(np.divmod(np.arange(number), places[1]))
-        self._first = places_of * grid.shape  # first sample of each block
-        self.offsets = places_of * grid.size
+        columns = math.ceil(math.sqrt(number))
+        self._make_surface(number, (math.ceil(number / columns), columns), config.border_height)
+        places = np.column_stack(np.divmod(np.arange(number), columns))
+        self._first = places * grid.shape  # first sample of each block
+        self.offsets = places * grid.size
         inner = np.add(grid.lower, config.border) + self.offsets
         self.lower, self.upper = inner - _LEAVE, inner + config.patch_size + _LEAVE
-        self.heights = np.full(shape, config.border_height, np.float32)
-        self._tops = np.full_like(self.heights, -np.inf) if self._collision == "boxes" else None
-        collision = visible = None
-        if len(sample.solids):
-            collision = visible = PatchRasters(grid.lower, grid.size, places)
-            if not np.array_equal(sample.solids.collides, sample.solids.visible):
-                visible = PatchRasters(grid.lower, grid.size, places)
-        first_sample = grid.lower[0] + cell / 2, grid.lower[1] + cell / 2
-        self.surface = HeightfieldSurface(
-            heights=self.heights,
-            first_sample=first_sample,
-            cell=cell,
-            box_top=self._tops,
-            collision=collision,
-            visible=visible,
-        )
         # Far more than the heights of the sample, from which those of a patch differ little.
         low, high = float(sample.heights.min()), float(sample.heights.max())
         self._lowest, self._depth = 2 * low - high - 10, 3 * (high - low) + 20
@@ -136,6 +102,31 @@ class StreamGround(Ground):
         self.arrays = {name: getattr(self, name) for name in names}
         self._geoms: PatchGeoms | None = None
         self._elevation: NDArray[np.float32] | None = None
+
+    def _make_surface(self, number: int, blocks: tuple[int, int], height: float) -> None:
+        """Make the surface of a number of patches in rows and columns, which are flat at first."""
+        grid, solids = self._grid, self._sample.solids
+        shape = blocks[0] * grid.shape[0], blocks[1] * grid.shape[1]
+        per_sample = _BYTES_PER_SAMPLE
+        if len(solids):
+            per_sample += round(_BYTES_PER_PIXEL * (grid.cell / PIXEL) ** 2)
+        what = f"terrain.stream with env.num_envs {number}"
+        check_memory(math.prod(shape) * per_sample, what, ("env.num_envs", number))
+        self.heights = np.full(shape, height, np.float32)
+        self._tops = np.full_like(self.heights, -np.inf) if self._collision == "boxes" else None
+        collision = visible = None
+        if len(solids):
+            collision = visible = PatchRasters(grid.lower, grid.size, blocks)
+            if not np.array_equal(solids.collides, solids.visible):
+                visible = PatchRasters(grid.lower, grid.size, blocks)
+        self.surface = HeightfieldSurface(
+            heights=self.heights,
+            first_sample=(grid.lower[0] + grid.cell / 2, grid.lower[1] + grid.cell / 2),
+            cell=grid.cell,
+            box_top=self._tops,
+            collision=collision,
+            visible=visible,
+        )
 
     def spec(self) -> Any:
         """Return the heightfield of all patches, at height 0 until `bind`."""
@@ -238,6 +229,21 @@ class StreamGround(Ground):
     def _elevation_of(self, heights: FloatArray) -> FloatArray:
         """Return heights as data of a heightfield of MuJoCo, whose rows are along y."""
         return ((heights - self._lowest) / self._depth).T
+
+
+def _with_border(config: MapConfig, terrain: Terrain) -> MapConfig:
+    """Return the config of a map whose border is as wide as robots reach and measure."""
+    scan = terrain.measured_points_x, terrain.measured_points_y
+    near = (0.0, *terrain.foot_points_x), (0.0, *terrain.foot_points_y)
+    # A foot reaches as far as the ground is measured, and its points are around it.
+    reach = max(_farthest(scan), _REACH + _farthest(near))
+    border = math.ceil((_LEAVE + reach) / config.cell) * config.cell
+    return replace(config, border=border, border_height=config.edge_height, border_rim=0.0)
+
+
+def _farthest(points: tuple[Sequence[float], Sequence[float]]) -> float:
+    """Return the distance of the farthest point of a grid, given its x and its y [m]."""
+    return math.hypot(*(max(map(abs, values)) for values in points))
 
 
 def training_ground(ground: Ground, task: Task) -> Ground:

@@ -1,8 +1,8 @@
 """Train a policy for a robot on a terrain."""
 
 import os
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from terrainkit_robots.spec.robot_arrays import Robot
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.runner import LeggedRunner
+    from terrainkit_robots.rl.terrain import Ground
 
 
 def train(
@@ -62,30 +63,9 @@ def train(
     parts = run.parts_to_load(resume, robot, terrain, task) if resume else None
     continued = resume if parts is None else None
 
-    # Importing torch takes seconds; what is wrong with the arguments is said before.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    import torch
-
-    from terrainkit_robots.rl.env import make_env
-    from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
-    from terrainkit_robots.rl.stream_ground import training_ground
-
-    process_task = process_share(task)
-    if process_task.env.num_envs * process_task.runner.num_steps_per_env < 2:
-        # PPO divides by the standard deviation of the advantages.
-        raise ConfigError(
-            "runner.num_steps_per_env: got 1 with one environment; expected 2 or more"
-        )
-    device = resolve_device(device)
-    loaded_robot = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
-    torch.set_num_threads(process_task.env.num_threads)
-    torch.manual_seed(process_task.runner.seed)
-    env = make_env(process_task, loaded_robot, training_ground(ground, process_task), device)
-    runner = LeggedRunner(
-        env, device=device, progress_callback=progress_callback, should_stop=should_stop
-    )
-    locks = ExitStack()
-    try:
+    trained = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
+    runner = _make_runner(task, trained, ground, device, progress_callback, should_stop)
+    with _training_errors(runner), ExitStack() as locks:
         if continued and runner.is_main_process:  # before its last checkpoint is read
             locks.enter_context(run.run_lock(continued.folder))
         _load(runner, resume, parts)
@@ -99,27 +79,64 @@ def train(
                 locks.enter_context(run.run_lock(runner.folder))
             start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
-        runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
+        is_new = not runner.env.steps_since_reset.any()
+        runner.learn(total - completed, init_at_random_ep_len=is_new)
         if runner.folder is not None and not ground.is_plane:
-            (runner.folder / run.CURRICULUM_FILE).write_bytes(env.curriculum.draw())
-    except (TerrainkitError, OSError) as error:
-        if runner.folder is None:
-            raise
-        raise _name_last_checkpoint(error, runner.folder) from error
-    finally:
-        locks.close()
-        if torch.distributed.is_available() and torch.distributed.is_initialized():
-            torch.distributed.destroy_process_group()
+            (runner.folder / run.CURRICULUM_FILE).write_bytes(runner.env.curriculum.draw())
     return runner
 
 
-def _name_last_checkpoint(error: TerrainkitError | OSError, folder: Path) -> TerrainkitError:
-    """Return an error of a training whose message has the last checkpoint."""
-    saved = run.checkpoints(folder)
-    hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
-    if isinstance(error, TerrainkitError):
-        return type(error)(f"{error}; {hint}")
-    return ExportError(f"cannot write in {folder}: {error.strerror or error}; {hint}")
+def _make_runner(
+    task: Task,
+    robot: Robot,
+    ground: "Ground",
+    device: str,
+    progress_callback: "Callable[[LeggedRunner], object] | None",
+    should_stop: Callable[[], object],
+) -> "LeggedRunner":
+    """Return the runner of this process, with its share of the environments."""
+    # Importing torch takes seconds; what is wrong with the arguments is said before.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    import torch
+
+    from terrainkit_robots.rl.env import make_env
+    from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
+    from terrainkit_robots.rl.stream_ground import training_ground
+
+    task = process_share(task)
+    if task.env.num_envs * task.runner.num_steps_per_env < 2:
+        # PPO divides by the standard deviation of the advantages.
+        raise ConfigError(
+            "runner.num_steps_per_env: got 1 with one environment; expected 2 or more"
+        )
+    device = resolve_device(device)
+    torch.set_num_threads(task.env.num_threads)
+    torch.manual_seed(task.runner.seed)
+    env = make_env(task, robot, training_ground(ground, task), device)
+    return LeggedRunner(
+        env, device=device, progress_callback=progress_callback, should_stop=should_stop
+    )
+
+
+@contextmanager
+def _training_errors(runner: "LeggedRunner") -> Iterator[None]:
+    """Add the last checkpoint to the errors of a training, and end its group of processes."""
+    import torch
+
+    try:
+        yield
+    except (TerrainkitError, OSError) as error:
+        if runner.folder is None:
+            raise
+        saved = run.checkpoints(runner.folder)
+        hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
+        if isinstance(error, TerrainkitError):
+            raise type(error)(f"{error}; {hint}") from error
+        reason = error.strerror or error
+        raise ExportError(f"cannot write in {runner.folder}: {reason}; {hint}") from error
+    finally:
+        if torch.distributed.is_available() and torch.distributed.is_initialized():
+            torch.distributed.destroy_process_group()
 
 
 def _load(runner: "LeggedRunner", resume: run.Run | None, parts: dict[str, bool] | None) -> None:
