@@ -210,6 +210,7 @@ class Gait:
     """The gait to follow while commanded to move: neighboring feet swing in turn."""
 
     def __init__(self, cfg: Commands, leg_length: float, foot_pos: FloatArray) -> None:
+        self.leg_length = leg_length
         is_biped = len(foot_pos) == 2
         default = np.sqrt(leg_length / 9.81) * (BIPED_GAIT_PERIOD if is_biped else GAIT_PERIOD)
         self.period = default if cfg.gait_period is None else cfg.gait_period

@@ -139,14 +139,7 @@ class LeggedEnv(VecEnv):
         self.rng = np.random.default_rng(task.runner.seed)
         self.curriculum = TerrainCurriculum(terrain, self.num_envs, task.terrain, task.runner.seed)
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
-        self.sensors = Sensors(
-            self.sim,
-            terrain,
-            task,
-            averaging_time=self.gait.averaging_time,
-            leg_length=robot.leg_length,
-            points=self.scan_points,
-        )
+        self.sensors = Sensors(self.sim, terrain, task.dt, self.gait, self.scan_points)
         self.actions = JointActions(robot, task.control, self.scene.model)
         self.num_actions = len(self.actions.joints)
         self._make_buffers()

@@ -68,6 +68,9 @@ class ObservationTerm:
     """Unit of the value, or of each number, for the description of exported policies."""
 
 
+_FOOT_CONTACT = ObservationTerm(lambda env: env.state.foot_contact.astype("f4"), "contacts")
+"""Which feet are in contact, 0 or 1."""
+
 ObsTerms = Mapping[str, Mapping[str, ObservationTerm]]
 """The terms of each observation group by name."""
 
@@ -136,7 +139,7 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
             unit="m/s",
         )
     if options.foot_contact:
-        terms["foot_contact"] = term(lambda env: env.state.foot_contact.astype("f4"), "contacts")
+        terms["foot_contact"] = _FOOT_CONTACT
     if env.history_length > 1:
         terms["history"] = term(lambda env: env.obs_history, "history")
     if env.has_height_scan:
@@ -182,11 +185,10 @@ def _deepest(env: "LeggedEnv") -> float:
 def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     """Return the critic's terms; contact forces are in units of the robot's weight."""
     term = ObservationTerm
-    scale = env.cfg.normalization.obs_scales.lin_vel
     # Of the policy's terms, the linear velocity comes last.
     known = {k: v for k, v in policy_terms(env).items() if k not in ("base_lin_vel", "history")}
     return known | {
-        "base_lin_vel": term(lambda env: env.state.base_lin_vel, "vector", scale),
+        "base_lin_vel": _base_lin_vel(env),
         "mean_vel": term(lambda env: env.state.mean_vel, "command"),
         "friction": term(lambda env: env.params.friction),
         "added_mass": term(lambda env: env.params.added_mass),
@@ -199,15 +201,12 @@ def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
 
 def estimate_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     """Return the terms that an estimator predicts: base linear velocity and foot contacts."""
+    return {"base_lin_vel": _base_lin_vel(env), "foot_contact": _FOOT_CONTACT}
+
+
+def _base_lin_vel(env: "LeggedEnv") -> ObservationTerm:
     scale = env.cfg.normalization.obs_scales.lin_vel
-    return {
-        "base_lin_vel": ObservationTerm(
-            lambda env: env.state.base_lin_vel, "vector", scale, unit="m/s"
-        ),
-        "foot_contact": ObservationTerm(
-            lambda env: env.state.foot_contact.astype("f4"), "contacts"
-        ),
-    }
+    return ObservationTerm(lambda env: env.state.base_lin_vel, "vector", scale, unit="m/s")
 
 
 def _push_vel(env: "LeggedEnv") -> FloatArray:

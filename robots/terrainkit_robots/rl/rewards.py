@@ -240,10 +240,8 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     The arc is above the edge ahead of a foot: in front of a riser, the foot has to rise before it
     is above the step, and above a gap it does not have to descend.
     """
-    phase, height = (
-        env.state.swing_phase,
-        env.state.foot_height_over_edges / target_swing_height(env),
-    )
+    phase = env.state.swing_phase
+    height = env.state.foot_height_over_edges / target_swing_height(env)
     # Clipped for the same reason as the base height: a foot may be above or in a hole. With the
     # limit 0, a foot before a riser gained nothing by rising until it was above the step.
     return (np.square(np.clip(height, -1, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)

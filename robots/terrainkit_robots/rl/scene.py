@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, listing, one_line
 from terrainkit.integrations.near_geoms import collides
 from terrainkit_robots.analysis.bodies.contact import MAX_SOLE_DEPTH
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -68,7 +68,7 @@ class Scene:
             try:
                 self.model: Any = mjspec.compile()
             except ValueError as error:
-                raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
+                raise ConfigError(f"{robot.mjcf}: {one_line(str(error))}") from None
             if task.asset.visual_collisions:
                 _add_boxes(mjspec.body(robot.spec.base), self.model)
                 self.model = mjspec.compile()
@@ -92,14 +92,19 @@ class Scene:
         self.base: int = model.body(robot.spec.base).id
         of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[self.base]
         self.geoms = np.flatnonzero(collides(model) & of_robot)  # the robot's colliding geoms
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.default_qpos
+        mujoco.mj_kinematics(model, data)
         # At `default_qpos`, the position of each foot's site, and the distance from it down to the
         # lowest point of the foot [m], shapes (f, 3) and (f,).
-        foot_pos, self.sole_depth = _place_soles(robot, model, self.default_qpos)
+        foot_pos, self.sole_depth = _place_soles(robot, model, data)
         # Point of the base whose position and velocity are the robot's, in its frame [m]. Some
         # files have the frame beside the plane of symmetry, such as at the left hip.
-        self.center = np.array([0, _center_offset(foot_pos, robot.leg_length), 0], np.float32)
+        offset = float(foot_pos[:, 1].mean())
+        is_beside = abs(offset) > MIN_CENTER_OFFSET * robot.leg_length
+        self.center = np.array([0, offset if is_beside else 0, 0], np.float32)
         self.foot_pos = foot_pos - self.center
-        self.hip_joints = _hip_joints(robot, model, self.default_qpos)
+        self.hip_joints = _hip_joints(robot, model, data)
 
 
 def _attach(robot: Robot, terrain: Ground, task: Task) -> tuple[Any, Any]:
@@ -107,8 +112,7 @@ def _attach(robot: Robot, terrain: Ground, task: Task) -> tuple[Any, Any]:
     try:
         mjspec = mujoco.MjSpec.from_file(str(robot.mjcf))
     except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {reason}") from None
+        raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {one_line(str(error))}") from None
     ground_mjspec = terrain.spec()
     home = np.array(mjspec.keys[0].qpos if mjspec.keys else [])
     for element in (*mjspec.actuators, *mjspec.sensors, *mjspec.keys, *mjspec.cameras):
@@ -239,7 +243,7 @@ def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
     return ranges
 
 
-def _place_soles(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArray, FloatArray]:
+def _place_soles(robot: Robot, model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
     """Move the site of each foot to the center of the geoms that touch the ground.
 
     A file does not show where they are: frames of meshes may be far from them, and compiled models
@@ -248,9 +252,6 @@ def _place_soles(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArra
     Returns:
         The `foot_pos`, of the frame of the base, and the `sole_depth` of a scene.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = default_qpos
-    mujoco.mj_kinematics(model, data)
     positions, depths = [], []
     for foot in robot.spec.feet:
         body, site = model.body(foot).id, model.site(SOLE + foot).id
@@ -267,20 +268,11 @@ def _place_soles(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArra
     return np.array(positions, np.float32), np.array(depths, np.float32)
 
 
-def _center_offset(foot_pos: FloatArray, leg_length: float) -> float:
-    """Return how far left of the base's frame the middle of the feet is [m]; 0 if it is close."""
-    offset = float(foot_pos[:, 1].mean())
-    return offset if abs(offset) > MIN_CENTER_OFFSET * leg_length else 0.0
-
-
-def _hip_joints(robot: Robot, model: Any, default_qpos: Any) -> NDArray[np.int64]:
+def _hip_joints(robot: Robot, model: Any, data: Any) -> NDArray[np.int64]:
     """Return the indices of the hip joints that turn about another axis than the pitch axis.
 
     They are those of one leg, above its knee; a robot whose spec has no thighs has none.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = default_qpos
-    mujoco.mj_kinematics(model, data)
     legs = np.zeros(model.nbody, np.int64)  # number of the thighs at or below each body
     for thigh in robot.spec.thighs:
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, thigh)

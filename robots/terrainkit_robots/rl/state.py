@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from terrainkit.perception.height_scan import HeightScan
 from terrainkit.perception.orientation import projected_gravity, quat_to_yaw
-from terrainkit_robots.rl.config import Task, Terrain
+from terrainkit_robots.rl.commands import Gait
+from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
@@ -110,30 +111,22 @@ class Sensors:
     """Measure n robots."""
 
     def __init__(
-        self,
-        sim: Simulation,
-        terrain: Ground,
-        task: Task,
-        *,
-        averaging_time: float,
-        leg_length: float,
-        points: FloatArray,
+        self, sim: Simulation, terrain: Ground, dt: float, gait: Gait, points: FloatArray
     ) -> None:
         """Prepare the sensors.
 
         Args:
             sim: The simulations.
             terrain: The terrain under the robots.
-            task: The task.
-            averaging_time: Time over which `mean_vel` is averaged [s].
-            leg_length: Length of the legs [m].
+            dt: Time of a step [s].
+            gait: The gait, over whose period `mean_vel` is averaged on two legs.
             points: Points of the height scan [m], shape (k, 2); none for no height scan.
         """
         self._sim, self._terrain = sim, terrain
-        self._dt = np.float32(task.dt)
-        self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
+        self._dt = np.float32(dt)
+        self._mean_weight = np.float32(dt / max(gait.averaging_time, dt))
         self._scan = HeightScan(terrain, points=points)
-        self._near_foot = np.float32(NEAR_FOOT * leg_length) * _NEAR_POINTS
+        self._near_foot = np.float32(NEAR_FOOT * gait.leg_length) * _NEAR_POINTS
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
         """Return x, y and z of the points of the height scan [m], shape (n, k) each.
