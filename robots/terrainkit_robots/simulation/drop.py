@@ -8,6 +8,12 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.rollout import Rollout
 from terrainkit_robots.simulation.sim_model import SimModel
 
+DROP_HEIGHT = 0.1
+"""Height of the lowest shape above the floor at the start [m]."""
+
+_SECONDS = 1.5
+"""Simulated time [s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DropResult:
@@ -26,15 +32,11 @@ class DropResult:
     """Simulated time [s]; shorter than requested if the simulation diverged."""
 
 
-def drop_test(
-    sim: SimModel, *, height: float = 0.1, seconds: float = 1.5, self_collision: bool = True
-) -> DropResult:
+def drop_test(sim: SimModel, *, self_collision: bool = True) -> DropResult:
     """Drop a robot from its standing pose without joint torques.
 
     Args:
         sim: The robot.
-        height: Height of its lowest shape above the floor [m].
-        seconds: Time to simulate [s].
         self_collision: Whether the shapes of the robot collide with each other.
 
     Raises:
@@ -42,9 +44,9 @@ def drop_test(
     """
     with quiet_mujoco():
         rollout = Rollout(sim, self_collision=self_collision)
-        rollout.reset(sim.standing_qpos, clearance=height)
+        rollout.reset(sim.standing_qpos, clearance=DROP_HEIGHT)
         speeds, steps = np.zeros(rollout.model.nv), 0
-        for _ in rollout.steps(seconds):
+        for _ in rollout.steps(_SECONDS):
             np.maximum(speeds, np.abs(rollout.data.qvel), out=speeds)
             steps += 1
         diverged, time_step = rollout.diverged, rollout.model.opt.timestep

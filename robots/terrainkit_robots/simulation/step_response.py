@@ -89,9 +89,8 @@ def _response(model: Any, start: Any, actuator: int) -> StepResponse:
     data = copy.copy(start)
     step = _STEP["slide" if is_slide else "hinge"]
     target = float(start.ctrl[actuator])
-    low, high = np.array([-np.inf, np.inf])
-    if model.actuator_ctrllimited[actuator]:
-        low, high = model.actuator_ctrlrange[actuator]
+    is_limited = model.actuator_ctrllimited[actuator]
+    low, high = model.actuator_ctrlrange[actuator] if is_limited else (-np.inf, np.inf)
     # Toward the side with more room.
     step = min(step, high - target) if high - target >= target - low else -min(step, target - low)
     data.ctrl[actuator] = target + step

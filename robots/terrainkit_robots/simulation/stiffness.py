@@ -241,15 +241,14 @@ def _max_gravity_load(sim: SimModel, name: str) -> float:
     body = int(model.joint(name).bodyid[0])
     if sim.units(name) == PRISMATIC:
         return float(model.body_subtreemass[body]) * GRAVITY
-    distance = {body: float(np.linalg.norm(model.joint(name).pos))}
-    total = 0.0
-    for index in range(body, model.nbody):
+    distances = {body: float(np.linalg.norm(model.joint(name).pos))}
+    for index in range(body + 1, model.nbody):
         parent = int(model.body_parentid[index])
-        if index != body and parent not in distance:
-            continue
-        if index != body:
-            distance[index] = distance[parent] + float(np.linalg.norm(model.body_pos[index]))
+        if parent in distances:
+            distances[index] = distances[parent] + float(np.linalg.norm(model.body_pos[index]))
+    total = 0.0
+    for index, distance in distances.items():
         # By the triangle inequality, no pose moves the mass further from the axis than this.
-        lever = distance[index] + float(np.linalg.norm(model.body_ipos[index]))
+        lever = distance + float(np.linalg.norm(model.body_ipos[index]))
         total += float(model.body_mass[index]) * lever
     return total * GRAVITY

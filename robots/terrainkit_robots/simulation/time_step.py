@@ -43,19 +43,18 @@ def joint_inertia(sim: SimModel) -> Mapping[str, JointInertia]:
     }
 
 
-def max_stable_stiffness(inertia: float, time_step: float = TIME_STEP) -> float:
+def max_stable_stiffness(inertia: float) -> float:
     """Return the stiffness up to which critical damping is stable [N m/rad] or [N/m].
 
     Args:
         inertia: Inertia of the joint when all others are free [kg m2] or [kg].
-        time_step: Time step [s].
     """
-    return (_MAX_FREQUENCY_STEP / time_step) ** 2 * inertia
+    return (_MAX_FREQUENCY_STEP / TIME_STEP) ** 2 * inertia
 
 
-def min_stable_inertia(stiffness: float, time_step: float = TIME_STEP) -> float:
+def min_stable_inertia(stiffness: float) -> float:
     """Return the inertia from which a stiffness with critical damping is stable [kg m2] or [kg]."""
-    return stiffness * (time_step / _MAX_FREQUENCY_STEP) ** 2
+    return stiffness * (TIME_STEP / _MAX_FREQUENCY_STEP) ** 2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.simulation.assessment import assess
-from terrainkit_robots.simulation.drop import DropResult, drop_test
+from terrainkit_robots.simulation.drop import DROP_HEIGHT, DropResult, drop_test
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.standing import (
@@ -20,9 +20,6 @@ from terrainkit_robots.simulation.standing import (
 _MAX_SPEED, _MAX_SPEED_ERROR = 100.0, 500.0
 """Joint velocity in the drop test [rad/s] or [m/s]: limits of the warning and the error. Robots
 without defects stay below 75; motors of legged robots reach 30."""
-
-_DROP_HEIGHT = 0.1
-"""Height of the drop test [m]."""
 
 MAX_SINGLE_LEGS = 6
 """With more legs, two branches usually form one leg through a closed loop. URDF has no loops, so
@@ -51,10 +48,10 @@ def unstable_drop(robot: Facts) -> Violations:
         MuJoCo at legged_gym's time step of 5 ms; its warnings BADQPOS, BADQVEL, BADQACC.
     """
     model = make_sim_model(robot)
-    drop = drop_test(model, height=_DROP_HEIGHT)
+    drop = drop_test(model)
     if _is_stable(drop):
         return
-    without = drop_test(model, height=_DROP_HEIGHT, self_collision=False)
+    without = drop_test(model, self_collision=False)
     stable = _is_stable(without)
     with_hulls = stable and _has_mesh_collision(robot)
     level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
@@ -62,7 +59,7 @@ def unstable_drop(robot: Facts) -> Violations:
     got = f"{drop.max_speed:.0f} {unit} at {drop.max_speed_joint}"
     if drop.diverged:
         got = f"an unstable state after {drop.seconds:.2f} s"
-    start = f"dropped from {_DROP_HEIGHT:g} m" if model.floating else "released"
+    start = f"dropped from {DROP_HEIGHT:g} m" if model.floating else "released"
     calm = f"; without self-collision {without.max_speed:.0f} {unit_without}" if stable else ""
     measured: dict[str, float | int | str] = {
         "speed": round(drop.max_speed, 1),
