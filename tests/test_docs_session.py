@@ -51,6 +51,7 @@ EXEMPT = {
     ("isaaclab.md", "pip install isaaclab"): Reason.INSTALLS,
     ("mjlab.md", "pip install mjlab"): Reason.INSTALLS,
     ("small_robot.md", "git clone"): Reason.DOWNLOADS,
+    ("small_robot.md", "microduck_runtime --model"): Reason.DOWNLOADS,
 }
 """The blocks that run nowhere, by page and a text in them."""
 
