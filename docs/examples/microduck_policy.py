@@ -3,7 +3,7 @@
 Install: pip install '.[train]' (in a clone of terrainkit)
 Run: python microduck_policy.py RUN walking.onnx
 RUN is the folder of a training of MicroDuck with `--observations.history-length 1`.
-Options of microduck_runtime: --action-scale 1 --neck-pitch-default 0 --head-pitch-default 0
+docs/small_robot.md has the options of microduck_runtime.
 """
 
 import math
@@ -21,7 +21,7 @@ from terrainkit_robots.rl.terrain import Plane
 
 LEG = 0.0, 0.0, 0.6, -1.2, 0.6
 DEFAULT_POSITION = torch.tensor([*LEG, 0.0, 0.0, 0.0, 0.0, *(-angle for angle in LEG)])
-"""As in src/motor.rs of microduck_runtime, without the mouth; the neck as in the options [rad]."""
+"""As in src/motor.rs of microduck_runtime, without the mouth; neck and head at 0 [rad]."""
 # The runtime has no phase: tiny targets of the head are the sine and the cosine of the next one.
 MEMORY_JOINTS, MEMORY = ["head_yaw", "head_roll"], [7, 8]
 AMPLITUDE = 0.0005
