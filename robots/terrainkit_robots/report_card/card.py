@@ -189,7 +189,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
         result = LevelResult(
             level=level,
             parameters=parameters,
-            outcomes={each: int((outcomes[level] == k).sum()) for k, each in enumerate(OUTCOMES)},
+            outcomes={name: int((outcomes[level] == k).sum()) for k, name in enumerate(OUTCOMES)},
             success=success,
             interval=interval,
             seconds=float(np.nanmean(seconds[level])) if success else None,
