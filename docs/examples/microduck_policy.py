@@ -48,7 +48,7 @@ class RuntimeNetwork(torch.nn.Module):
         self.rotation = torch.tensor([[cos, -sin], [sin, cos]])
 
     def forward(self, obs):
-        """Return the actions, shape (n, 14), for observations of the runtime, shape (n, 51)."""
+        """Return the actions, shape (1, 14), for observations of the runtime, shape (1, 51)."""
         ang_vel, gravity, pos, vel, last, command = obs.split([3, 3, 14, 14, 14, 3], dim=1)
         lin, yaw = command[:, :2], command[:, 2:]
         lin = lin * (lin.norm(dim=1, keepdim=True) >= self.min_norm)
