@@ -11,6 +11,7 @@ from collections import ChainMap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,11 @@ from terrainkit.settings.toml_text import read_text
 MAX_FILES = 50
 """Most files that are read, with the files that they import."""
 
-MAX_VALUES = 500_000
-"""Most values of all files, where each class, list and table counts all that is in it."""
+MAX_VALUES = 10_000
+"""Most values of a class, and items of a list or table."""
+
+MAX_TOTAL = 500_000
+"""Most values of all files, where each class also counts what it inherits."""
 
 PARENT = "(parent class)"
 """Name under which a class has a parent that is not read."""
@@ -74,11 +78,11 @@ class Modules(dict[Path, Namespace]):
         """Count values.
 
         Raises:
-            ConfigError: If there are more than `MAX_VALUES`.
+            ConfigError: If there are more than `MAX_TOTAL`.
         """
         self.count += count
-        if self.count > MAX_VALUES:
-            raise ConfigError(f"got more than {MAX_VALUES} values in all classes; expected fewer")
+        if self.count > MAX_TOTAL:
+            raise ConfigError(f"got more than {MAX_TOTAL} values in all classes; expected fewer")
 
 
 @dataclass(kw_only=True)
@@ -241,9 +245,11 @@ class Module:
         return result
 
     def _checked(self, value: Any) -> Any:
-        """Count the values in a class, list or table, and return it."""
-        for _ in _items(value):
-            self.modules.add(1)
+        """Return a class, list or table that has fewer than `MAX_VALUES` values in it."""
+        count = len([*islice(_items(value), MAX_VALUES)])
+        if count == MAX_VALUES:
+            raise ConfigError(f"got {count} values in a class or list; expected fewer")
+        self.modules.add(count)
         return value
 
 
