@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Generic, TypeVar
 
 Row = TypeVar("Row")
@@ -40,6 +40,6 @@ class ResultTable(Generic[Row]):
 
 
 def _values(value: Any) -> dict[str, Any]:
-    """Return the values of a table or a dataclass."""
-    values: dict[str, Any] = value.as_dict() if hasattr(value, "as_dict") else vars(value)
+    """Return the values of a table or a dataclass; of others, JSON has no values."""
+    values: dict[str, Any] = value.as_dict() if hasattr(value, "as_dict") else asdict(value)
     return values

@@ -1,5 +1,8 @@
 import json
 from dataclasses import dataclass
+from types import SimpleNamespace
+
+import pytest
 
 from terrainkit_robots.policy.result_table import ResultTable
 
@@ -37,6 +40,12 @@ def test_json_has_the_version_what_was_measured_the_rows_and_the_remarks():
         "left_out": None,
     }
     assert table["laps"][0].seconds == (0.5, 1.5)
+
+
+def test_json_has_no_values_of_other_objects():
+    table = ResultTable(about={"path": SimpleNamespace(number=1)}, tables={})
+    with pytest.raises(TypeError, match="dataclass"):
+        table.to_json()
 
 
 def test_json_may_have_no_version():
