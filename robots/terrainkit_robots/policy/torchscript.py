@@ -10,6 +10,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 import torch
@@ -225,9 +226,9 @@ def call_script(module: Any, obs: torch.Tensor) -> torch.Tensor:
 
 def _states(module: Any) -> list[tuple[Any, str, torch.Tensor]]:
     """Return owner, name and value of each buffer with a state, shape (layers, n, width)."""
-    return [
-        (owner, name, value)
-        for owner in module.modules()
-        for name, value in owner.named_buffers(recurse=False)
-        if value.dim() == 3 and re.search("hidden|cell|state", name)
-    ]
+    found = []
+    for path, value in module.named_buffers():  # a buffer that modules share, once
+        parent, _, name = path.rpartition(".")
+        if value.dim() == 3 and re.search("hidden|cell|state", name):
+            found.append((attrgetter(parent)(module) if parent else module, name, value))
+    return found

@@ -94,9 +94,10 @@ def save(tmp_path):
     return write
 
 
-def test_state_is_kept_for_each_robot(save):
+@pytest.mark.parametrize("is_nested", [False, True])
+def test_state_is_kept_for_each_robot(save, is_nested):
     torch.manual_seed(0)
-    data = archive(Recurrent())
+    data = archive(torch.nn.Sequential(Recurrent()) if is_nested else Recurrent())
     policy, obs = PolicyFile(save(data)), torch.randn(5, 3)
     assert (policy.num_obs, policy.num_actions) == (3, 4)
     first = policy(obs)
