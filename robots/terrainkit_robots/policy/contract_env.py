@@ -11,7 +11,7 @@ from terrainkit.errors import listing
 from terrainkit.perception.orientation import projected_gravity
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit_robots.policy.contracts.contract import (
-    COMMANDS,
+    COMMAND_NAMES,
     DEFAULT_STEP_DT,
     Contract,
     ContractError,
@@ -222,7 +222,9 @@ def contract_task(contract: Contract, task: Task) -> Task:
     step_dt, dt = contract.step_dt or DEFAULT_STEP_DT, contract.physics_dt or task.sim.dt
     decimation = max(1, round(step_dt / dt))
     commands: dict[str, Any] = {
-        COMMANDS[name]: limits for name, limits in contract.commands.items() if name in COMMANDS
+        COMMAND_NAMES[name]: limits
+        for name, limits in contract.commands.items()
+        if name in COMMAND_NAMES
     }
     for term in contract.terms:
         if "period" in term.params:

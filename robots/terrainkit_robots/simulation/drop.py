@@ -29,7 +29,7 @@ class DropResult:
     """The joint with that speed; `base` for the base."""
 
     seconds: float
-    """Simulated time [s]; shorter than requested if the simulation diverged."""
+    """Simulated time [s]; shorter if the simulation diverged."""
 
 
 def drop_test(sim: SimModel, *, self_collision: bool = True) -> DropResult:

@@ -41,7 +41,7 @@ tasks."""
 MAX_HISTORY = 100
 """Longest history [steps], as `observations.history_length` allows."""
 
-COMMANDS = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
+COMMAND_NAMES = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
 """terrainkit's name of each range of commands."""
 
 FORMATS = "deploy.yaml", "metadata of mjlab"
@@ -129,7 +129,7 @@ class Contract:
     """Time step of the simulation of the training [s]; None if it is not stated."""
 
     commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Ranges by the names in `COMMANDS` [m/s, rad/s]."""
+    """Ranges by the names in `COMMAND_NAMES` [m/s, rad/s]."""
 
     doubts: tuple[ContractError, ...] = ()
     """What is doubtful in the file, but can be read."""

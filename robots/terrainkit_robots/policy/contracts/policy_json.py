@@ -9,7 +9,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit_robots.policy.contracts.contract import (
-    COMMANDS,
+    COMMAND_NAMES,
     FORMATS,
     TERM_NAMES,
     Contract,
@@ -146,5 +146,5 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
         terms=tuple(terms),
         step_dt=document["timing"]["policy_dt"],
         physics_dt=document["timing"]["physics_dt"],
-        commands={name: tuple(commands[key]) for name, key in COMMANDS.items()},
+        commands={name: tuple(commands[key]) for name, key in COMMAND_NAMES.items()},
     )

@@ -47,6 +47,7 @@ def drop(speed=1.0, joint="FL_hip_joint", *, diverged=False):
 )
 def test_unstable_drop_severity(monkeypatch, with_contacts, without, has_mesh, expected):
     def drop_test(_, *, self_collision=True):
+        assert stability.DROP_HEIGHT == 0.1
         return with_contacts if self_collision else without
 
     monkeypatch.setattr(stability, "drop_test", drop_test)
