@@ -9,17 +9,22 @@ import subprocess
 import sys
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import nbclient
 import nbformat
 import numpy as np
+import onnxruntime
 import pytest
 import torch
+
+from terrainkit_robots.policy.export import export_onnx
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "docs/examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+MICRODUCK = EXAMPLES / "microduck_policy.py"  # its network is tested here
 
 WRITTEN = {
     "generate_map": ("map.npz", "map.png", "map.xml"),
@@ -41,7 +46,6 @@ CHECKS = "".join(
     for path in (
         *(ROOT / "tests/frameworks").glob("*_check.py"),
         ROOT / "tests/terrainkit_cli/test_own_task.py",
-        Path(__file__),
     )
 )
 
@@ -87,7 +91,7 @@ def test_example_runs_in_an_empty_folder(name, tmp_path):
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
 def test_example_is_run_and_short_and_says_what_to_install(path):
-    is_run = path.stem in WRITTEN or f"examples/{path.name}" in CHECKS
+    is_run = path.stem in WRITTEN or path == MICRODUCK or f"examples/{path.name}" in CHECKS
     assert is_run, f"{path.name} is neither in WRITTEN nor in tests/frameworks or test_own_task.py"
     text = path.read_text()
     assert len(text.splitlines()) <= 90
@@ -140,7 +144,8 @@ print(legged_robot.Terrain is terrain.Terrain)
 class Echo(torch.nn.Module):
     """A policy of 10 actions: some of its observations, and then zeros."""
 
-    model = None
+    model = SimpleNamespace(input_names=["obs"], output_names=["actions"])
+    model.get_dummy_inputs = lambda: (None,)
 
     def __init__(self, first, stop):
         super().__init__()
@@ -152,9 +157,9 @@ class Echo(torch.nn.Module):
 
 
 @pytest.fixture
-def microduck():
-    """Return a function that makes a network of the example for an `Echo` of a part."""
-    network = runpy.run_path(str(ROOT / "docs/examples/microduck_policy.py"))["RuntimeNetwork"]
+def make_microduck():
+    """Return a function that makes the network of the example for an `Echo` of a part."""
+    network = runpy.run_path(str(MICRODUCK))["RuntimeNetwork"]
     head = "neck_pitch", "head_pitch", "head_yaw", "head_roll"
     left, right = ([f"{side}_{k}" for k in range(5)] for side in ("left", "right"))
     sizes = {"commands": 3, "projected_gravity": 3, "base_ang_vel": 3, "dof_pos": 14}
@@ -166,7 +171,7 @@ def microduck():
         parts.append(part | {"scale": [scale] * size, "offset": [offset] * size})
         start += size
     description = {
-        "observation": {"parts": parts},
+        "observation": {"parts": parts, "size": start},
         "joints": {
             "name": [*left, *head, *right],
             "action_scale": [0.25] * 14,
@@ -178,10 +183,20 @@ def microduck():
         "min_norm": 0.04,
     }
 
-    def make(name):
+    def make(name, **changed):
         (part,) = (part for part in parts if part["name"] == name)
         echo = Echo(part["start"], min(part["stop"], part["start"] + 10))
-        policy = network(echo, description)
+        return network(echo, description | changed)
+
+    return make
+
+
+@pytest.fixture
+def microduck(make_microduck):
+    """Return a function that makes such a network as a function of one observation."""
+
+    def make(name):
+        policy = make_microduck(name)
         return lambda obs: policy(torch.tensor(obs[None], dtype=torch.float32))[0].numpy()
 
     return make
@@ -227,6 +242,26 @@ def test_microduck_policy_keeps_last_action_and_phase(microduck):
         obs[34:48] = actions
     obs[48] = 0.0
     np.testing.assert_allclose(phases(obs)[:2], 0.1, atol=1e-6)  # commanded to stand
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"timing": {"policy_dt": 0.01}}, r"got \(.*\], 0.01, 49\); expected \(.*\], 0.02, 49\)$"),
+        ({"observation": {"parts": [], "size": 245}}, r"number of observations: got .* 245\);"),
+        ({"action": {"joints": ["head_yaw"]}}, r"joints without an action.*: got .*'right_4'\],"),
+    ],
+)
+def test_microduck_policy_says_what_it_needs(make_microduck, changed, expected):
+    with pytest.raises(SystemExit, match=expected):
+        make_microduck("commands", **changed)
+
+
+def test_microduck_policy_is_exported_for_several_robots(make_microduck):
+    policy, obs = make_microduck("dof_pos"), torch.randn(3, 51)
+    session = onnxruntime.InferenceSession(export_onnx(policy, torch.zeros(1, 51), {}))
+    (actions,) = session.run(["actions"], {"obs": obs.numpy()})
+    np.testing.assert_allclose(actions, policy(obs).numpy(), atol=1e-6)
 
 
 def test_notebook_runs_and_shows_maps(tmp_path, monkeypatch):
